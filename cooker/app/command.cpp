@@ -1,0 +1,50 @@
+#include <app/command.h>
+
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+
+#include <cstdio>
+
+namespace dimmer::cook {
+
+int exitCodeOf(ErrorCode code) {
+    switch (code) {
+        case ErrorCode::InvalidArgument:
+        case ErrorCode::NotFound:
+        case ErrorCode::BadInput:
+        case ErrorCode::Io:
+            return exit_bad_input;
+        case ErrorCode::OverBudget:
+            return exit_over_budget;
+        case ErrorCode::Unsupported:
+        case ErrorCode::OutOfMemory:
+        case ErrorCode::DeviceLost:
+        case ErrorCode::Internal:
+            return exit_our_fault;
+    }
+    return exit_our_fault;
+}
+
+int reportError(const Error& error) {
+    fmt::print(stderr, "dimmer: error: {}\n", error.message);
+    return exitCodeOf(error.code);
+}
+
+Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& file) {
+    const std::string text = json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+    if (file == "-") {
+        fmt::print("{}", text);
+        return {};
+    }
+    return writeFileAtomically(file, std::as_bytes(std::span(text)));
+}
+
+std::string humanBytes(uint64_t bytes) {
+    const auto value = static_cast<double>(bytes);
+    if (bytes < 1000) return fmt::format("{} B", bytes);
+    if (bytes < 1000000) return fmt::format("{:.1f} kB", value / 1e3);
+    return fmt::format("{:.2f} MB", value / 1e6);
+}
+
+}  // namespace dimmer::cook

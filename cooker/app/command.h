@@ -1,0 +1,37 @@
+// The command line: one function per subcommand, each in its own file, and what they share.
+#pragma once
+
+#include <dimmer/error.h>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <string_view>
+
+namespace dimmer::cook {
+
+// The contract with scripts and pipelines.
+enum ExitCode : int {
+    exit_done = 0,
+    exit_our_fault = 1,
+    exit_bad_input = 2,
+    exit_over_budget = 3,
+};
+
+// Each adds a subcommand whose callback stores the process's exit code.
+void addCookCommand(CLI::App& app, int& exit_code);
+void addInspectCommand(CLI::App& app, int& exit_code);
+void addSampleCommand(CLI::App& app, int& exit_code);
+void addBenchCommand(CLI::App& app, int& exit_code);
+
+// Prints the message to stderr; the exit code that belongs to it.
+int reportError(const Error& error);
+int exitCodeOf(ErrorCode code);
+
+// To a file, or to stdout for "-".
+Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& file);
+
+std::string humanBytes(uint64_t bytes);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,99 @@
+#include <app/command.h>
+#include <app/terminal_progress.h>
+#include <pipeline/budget.h>
+#include <pipeline/cook.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <memory>
+
+namespace dimmer::cook {
+namespace {
+
+struct Arguments {
+    CookOptions options;
+    std::string json;
+};
+
+std::string share(uint64_t bytes, uint64_t budget) {
+    return budget == 0
+               ? ""
+               : fmt::format("{:5.1f} % of {}", 100.0 * static_cast<double>(bytes) / static_cast<double>(budget),
+                             humanBytes(budget));
+}
+
+void printTable(const CookResult& result, const PackCost& cost, const Profile& profile) {
+    const PackData& pack = result.pack;
+    fmt::print("{:<26} {:>12}  {}\n", "category", "bytes", "share of the budget");
+    auto row = [](std::string_view name, uint64_t bytes, uint64_t budget) {
+        fmt::print("{:<26} {:>12}  {}\n", name, humanBytes(bytes), share(bytes, budget));
+    };
+    row("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
+    row("dynamic records", cost.dynamic, profile.budget_dynamic);
+    row("ancillary", cost.ancillary, 0);
+    row("total on the device", cost.device(), profile.budget_total);
+    row("the file", result.file_bytes, 0);
+    fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "element", "bytes", "receivers", "energy dropped");
+    for (const ElementCost& e : cost.elements) {
+        float dropped = 0;
+        for (const Contribution& c : pack.contributions)
+            if (c.light_set == e.element) dropped = c.energy_dropped;
+        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n",
+                   (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
+                   humanBytes(e.bytes), e.receivers, 100 * static_cast<double>(dropped));
+    }
+    fmt::print("\n{} pages of {} x {}, {} clusters, {} batches, {} bounces, {:.1f} M rays, peak {}\n", pack.page_count,
+               pack.page_width, pack.page_height, pack.clusters.size(), pack.batches.size(), result.stats.bounces,
+               static_cast<double>(result.stats.rays) / 1e6, humanBytes(result.stats.peak_bytes));
+}
+
+nlohmann::ordered_json toJson(const CookResult& result) {
+    nlohmann::ordered_json json;
+    json["seconds"] = result.stats.seconds;
+    json["rays"] = result.stats.rays;
+    const auto bake = result.stats.seconds.find("bake");
+    json["rays_per_second"] = bake == result.stats.seconds.end() || bake->second <= 0
+                                  ? 0
+                                  : static_cast<double>(result.stats.rays) / bake->second;
+    json["peak_bytes"] = result.stats.peak_bytes;
+    json["file_bytes"] = result.file_bytes;
+    json["warnings"] = result.stats.warnings;
+    return json;
+}
+
+int run(const Arguments& a) {
+    const auto profile = loadProfile(a.options.profile);
+    if (!profile) return reportError(profile.error());
+    TerminalProgress progress;
+    const auto result = cook(a.options, progress);
+    if (!result) return reportError(result.error());
+    for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
+    if (!a.json.empty())
+        if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
+    if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
+    return exit_done;
+}
+
+}  // namespace
+
+void addCookCommand(CLI::App& app, int& exit_code) {
+    auto a = std::make_shared<Arguments>();
+    auto* c = app.add_subcommand("cook", "Bake a level and write its pack");
+    c->add_option("LEVEL", a->options.level, "the level, .glb or .gltf (see docs/level.md)")->required();
+    c->add_option("-o,--output", a->options.pack, "the pack to write, e.g. house.dimmer")->required();
+    c->add_option("--profile", a->options.profile,
+                  fmt::format("target: {}, or a JSON file", fmt::join(shippedProfiles(), ", ")))
+        ->capture_default_str();
+    c->add_option("--quality", a->options.quality,
+                  "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
+        ->check(CLI::IsMember({"draft", "preview", "final"}))
+        ->capture_default_str();
+    c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
+        ->capture_default_str();
+    c->add_option("--json", a->json, "write stage times, rays, peak memory and warnings there; - for stdout");
+    c->footer("Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
+    c->callback([a, &exit_code] { exit_code = run(*a); });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,127 @@
+#include <app/command.h>
+#include <format/layout.h>
+#include <pack/pack_data.h>
+#include <pipeline/budget.h>
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+namespace dimmer::cook {
+namespace {
+
+struct Arguments {
+    std::string pack;
+    std::string json;
+    bool settings = false;
+};
+
+std::string lightName(const PackData& d, const Contribution& c) {
+    return c.light_set ? d.elements[*c.light_set].name : "always";
+}
+
+std::vector<std::string> names(const PackData& d, const std::vector<uint32_t>& elements) {
+    std::vector<std::string> out;
+    for (uint32_t e : elements) out.push_back(d.elements[e].name);
+    return out;
+}
+
+nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
+    nlohmann::ordered_json j;
+    j["format_version"] = format::version;
+    j["exposure"] = d.exposure;
+    j["bytes"] = {{"file", file_bytes},          {"device", cost.device()}, {"base_lightmap", cost.base_lightmap},
+                  {"dynamic", cost.dynamic},     {"local_grids", 0},        {"global_grid", 0},
+                  {"ancillary", cost.ancillary}, {"meshes", cost.meshes}};
+    uint64_t texels = 0;
+    for (size_t n = 0; n < cost.overlap_histogram.size(); ++n) texels += cost.overlap_histogram[n];
+    j["receivers"] = {{"texels", texels}, {"local_probes", 0}, {"global_probes", 0}};
+    j["pages"] = nlohmann::ordered_json::array();
+    for (uint32_t p = 0; p < d.page_count; ++p)
+        j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
+    j["contributions"] = nlohmann::ordered_json::array();
+    for (const Contribution& c : d.contributions)
+        j["contributions"].push_back({{"light", lightName(d, c)},
+                                      {"doors_open", names(d, c.doors_open)},
+                                      {"doors_closed", names(d, c.doors_closed)},
+                                      {"receivers", c.receivers},
+                                      {"bytes", uint64_t{c.receivers} * sizeof(TexelRecord)},
+                                      {"energy_dropped", c.energy_dropped}});
+    j["elements"] = nlohmann::ordered_json::array();
+    for (const ElementCost& e : cost.elements)
+        j["elements"].push_back({{"name", d.elements[e.element].name},
+                                 {"kind", d.elements[e.element].kind == ElementKind::Door ? "door" : "set"},
+                                 {"receivers", e.receivers},
+                                 {"bytes", e.bytes}});
+    j["clusters"] = d.clusters.size();
+    j["batches"] = d.batches.size();
+    j["mixed_batches"] = 0;
+    j["overlap_histogram"] = cost.overlap_histogram;
+    const auto settings = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
+    j["settings"] = settings.is_discarded() ? nlohmann::ordered_json::object() : settings;
+    return j;
+}
+
+void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
+    auto row = [](std::string_view name, uint64_t bytes) { fmt::print("{:<26} {:>12}\n", name, humanBytes(bytes)); };
+    row("file", file_bytes);
+    row("device memory", cost.device());
+    row("  base lightmaps", cost.base_lightmap);
+    row("  dynamic records", cost.dynamic);
+    row("  ancillary", cost.ancillary);
+    row("meshes (host)", cost.meshes);
+    fmt::print(
+        "\n{} pages of {} x {}; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n", d.page_count,
+        d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
+        d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
+    fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
+    for (const Contribution& c : d.contributions)
+        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,
+                   humanBytes(uint64_t{c.receivers} * sizeof(TexelRecord)),
+                   100 * static_cast<double>(c.energy_dropped));
+    fmt::print("\n{:<26} {:>12}\n", "overlap", "texels");
+    for (size_t n = 0; n < cost.overlap_histogram.size(); ++n)
+        fmt::print("{:<26} {:>12}\n", n, cost.overlap_histogram[n]);
+}
+
+void printSettings(const PackData& d) {
+    const auto settings = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
+    for (const auto& [key, value] : settings.items())
+        fmt::print("{:<32} {:<16} {}\n", key, value.value("value", nlohmann::ordered_json()).dump(),
+                   value.value("from", ""));
+}
+
+int run(const Arguments& a) {
+    const auto pack = Pack::open(a.pack);
+    if (!pack) return reportError(pack.error());
+    std::error_code ignored;
+    const uint64_t file_bytes = std::filesystem::file_size(a.pack, ignored);
+    const PackCost cost = costOf(pack->data());
+    if (!a.json.empty())
+        if (auto ok = writeJson(toJson(pack->data(), cost, file_bytes), a.json); !ok) return reportError(ok.error());
+    if (a.settings)
+        printSettings(pack->data());
+    else if (a.json != "-")
+        printTable(pack->data(), cost, file_bytes);
+    return exit_done;
+}
+
+}  // namespace
+
+void addInspectCommand(CLI::App& app, int& exit_code) {
+    auto a = std::make_shared<Arguments>();
+    auto* c = app.add_subcommand("inspect", "What a pack holds and what it costs");
+    c->add_option("PACK", a->pack, "a cooked pack")->required();
+    c->add_option("--json", a->json, "write the same as JSON to a file; alone or with -: to stdout")
+        ->expected(0, 1)
+        ->default_str("-");
+    c->add_flag("--settings", a->settings, "print every setting of the cook and where it came from");
+    c->footer("Example: dimmer inspect house.dimmer --json -");
+    c->callback([a, c, &exit_code] {
+        if (c->count("--json") > 0 && a->json.empty()) a->json = "-";
+        exit_code = run(*a);
+    });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,51 @@
+// From charts to light: what every light group adds at every receiver.
+#pragma once
+
+#include <bake/gather.h>
+#include <bake/progress.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct BakeSettings {
+    uint32_t series_rays = 32;     // per texel, for the bounces; kept as 4-byte links while the series runs
+    uint32_t final_rays = 128;     // per texel, for what is stored
+    uint32_t emitter_samples = 8;  // per texel and light group
+    uint32_t bounces_max = 64;
+    float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
+    float threshold = 0.01f;  // activity, as a share of a set's mean indirect irradiance where it lights directly
+    uint32_t seed = 1;
+};
+
+// What is stored for one (receiver, group).
+struct ReceiverLight {
+    uint32_t group = 0;
+    Gathered light;
+};
+
+struct GroupReport {
+    uint64_t receivers = 0;  // active ones
+    uint64_t lit_directly = 0;
+    float threshold_lux = 0;
+    double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
+    double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1
+};
+
+struct Baked {
+    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active sets
+    std::vector<GroupReport> groups;  // always, then each light set
+    uint32_t bounces = 0;
+    uint64_t rays = 0;
+    std::vector<std::string> warnings;
+};
+
+// The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
+// receivers traced once and followed bounce after bounce, then one gather of many rays that is kept.
+// Deterministic for any number of threads. Memory: 4 bytes * series_rays per texel, plus what is active.
+Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
+           Progress& progress);
+
+}  // namespace dimmer::cook

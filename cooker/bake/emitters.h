@@ -1,0 +1,79 @@
+// Emissive triangles as light sources: which to sample from where, and how likely that is.
+#pragma once
+
+#include <bake/sparse_light.h>
+#include <trace/ray_scene.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct Emitter {
+    uint32_t triangle = 0;
+    uint32_t group = 0;
+    glm::vec3 corner, edge1, edge2, normal;
+    float area_m2 = 0;
+    glm::vec3 radiance_cd_m2{0};
+    bool double_sided = false;
+};
+
+// A point on an emitter, seen from a receiver.
+struct EmitterSample {
+    glm::vec3 direction;  // unit
+    float distance_m;
+    glm::vec3 radiance_cd_m2;
+    float pdf;  // per steradian; 0: nothing to see
+};
+
+// The chance of each emitter, per light group and per cell of a coarse grid: power over squared distance. Groups never
+// compete with one another, so adding a set changes nothing for the others.
+class EmitterSampler {
+   public:
+    EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups);
+
+    // The groups worth sampling from `cell`.
+    struct GroupRange {
+        uint32_t group;
+        uint32_t first, count;  // into the choices
+    };
+    uint32_t cellAt(glm::vec3 point) const;
+    std::span<const GroupRange> groups(uint32_t cell) const;
+
+    EmitterSample sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 on_triangle) const;
+
+    // The emitter of a level triangle, or null.
+    const Emitter* emitterOf(uint32_t triangle) const;
+    // The density per steradian with which sample() from `cell` finds the direction to a hit on `emitter`.
+    float pdf(uint32_t cell, const Emitter& emitter, float distance_m, float cos_emitter) const;
+
+    bool empty() const { return emitters_.empty(); }
+    std::span<const Emitter> emitters() const { return emitters_; }
+
+   private:
+    struct Choice {
+        uint32_t emitter;
+        float probability;
+        float cumulative;  // up to and including this one
+    };
+    struct Cell {
+        std::vector<GroupRange> ranges;
+        std::vector<Choice> choices;
+    };
+    void fillCell(Cell& cell, glm::vec3 centre, float radius_m) const;
+
+    std::vector<Emitter> emitters_;  // sorted by group
+    std::vector<uint32_t> emitter_of_;
+    glm::vec3 origin_{0};
+    float cell_m_ = 1;
+    glm::uvec3 size_{1};
+    std::vector<Cell> cells_;
+    // All cells' choices in one array each, so that ranges stay valid.
+    std::vector<uint32_t> first_range_;
+    std::vector<GroupRange> ranges_;
+    std::vector<Choice> choices_;
+};
+
+}  // namespace dimmer::cook

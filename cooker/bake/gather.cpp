@@ -1,0 +1,78 @@
+#include <bake/gather.h>
+
+#include <bake/sampling.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float far_away_m = 1e30f;
+// Shadow rays stop this short of the emitter they aim at, so as not to hit it.
+constexpr float shadow_end_share = 1 - 1e-4f;
+
+glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
+    return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
+}
+
+}  // namespace
+
+void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
+    irradiance_lux += lux;
+    moment_lux += luminance(lux) * direction_tangent;
+}
+
+void Gatherer::gather(size_t receiver, const GatherOptions& options, const SparseLight* outgoing,
+                      GroupAccumulator<Gathered>& sum, uint32_t* hits) const {
+    const uint32_t seed = hash(options.seed, static_cast<uint32_t>(receiver));
+    const uint32_t points = texels_.sampleCount(receiver);
+    const glm::vec3 sky = rays_.scene().sky_radiance_cd_m2;
+    const float lux_per_radiance = pi / static_cast<float>(options.rays);
+    for (uint32_t i = 0; i < options.rays; ++i) {
+        const SamplePoint& origin = texels_.sample(receiver, i % points);
+        const TangentFrame& frame = unwrap_.frames[origin.face];
+        const glm::vec3 d = cosineDirection(sequence2d(i, seed));
+        const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
+        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + i);
+        if (hits) hits[i] = no_index;
+        if (!hit) {
+            if (sky != glm::vec3(0)) sum[always_group].add(sky * lux_per_radiance, d);
+            continue;
+        }
+        if (const Emitter* e = emitters_.emitterOf(hit->triangle); e && (!hit->back || e->double_sided)) {
+            const float cos_emitter = std::abs(glm::dot(world, e->normal));
+            const float by_area = static_cast<float>(options.emitter_samples) *
+                                  emitters_.pdf(emitters_.cellAt(origin.position_m), *e, hit->distance_m, cos_emitter);
+            const float by_hit = static_cast<float>(options.rays) * d.z / pi;
+            sum[e->group].add(e->radiance_cd_m2 * (lux_per_radiance * by_hit / (by_hit + by_area)), d);
+        }
+        const uint32_t found = receiverOf(unwrap_, texels_, *hit);
+        if (found == no_index) continue;
+        if (hits) hits[i] = found;
+        if (!outgoing) continue;
+        for (const GroupLight& light : outgoing->row(found)) sum[light.group].add(light.value * lux_per_radiance, d);
+    }
+    if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(receiver, options, sum);
+}
+
+void Gatherer::sampleEmitters(size_t receiver, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const {
+    const uint32_t points = texels_.sampleCount(receiver);
+    const auto samples = static_cast<float>(options.emitter_samples);
+    for (uint32_t i = 0; i < options.emitter_samples; ++i) {
+        const SamplePoint& origin = texels_.sample(receiver, i % points);
+        const TangentFrame& frame = unwrap_.frames[origin.face];
+        for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
+            // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
+            const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, static_cast<uint32_t>(receiver)), range.group);
+            const float choice = (static_cast<float>(i) + unitFloat(hash(seed, i))) / samples;
+            const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(i, seed));
+            const glm::vec3 d = toTangent(frame, s.direction);
+            if (!(s.pdf > 0) || !(d.z > 0)) continue;
+            const float by_area = samples * s.pdf, by_hit = static_cast<float>(options.rays) * d.z / pi;
+            const float passed = rays_.transmittance(origin.position_m, s.direction, s.distance_m * shadow_end_share);
+            if (passed > 0) sum[range.group].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
+        }
+    }
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,51 @@
+// One gather of the light that arrives at a receiver, shared by every light group: what a ray hits does not depend on
+// which light is asked about, so each ray is traced once and brings home the light of all groups found at its end.
+#pragma once
+
+#include <bake/emitters.h>
+#include <bake/sparse_light.h>
+#include <charts/texels.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+
+namespace dimmer::cook {
+
+// Light of one group at one receiver.
+struct Gathered {
+    glm::vec3 irradiance_lux{0};
+    // Integral of luminance * cos(theta) * direction, in the tangent frame: its length over the luminance of the
+    // irradiance says how directional the light is. Adds up over contributions.
+    glm::vec3 moment_lux{0};
+
+    void add(glm::vec3 lux, glm::vec3 direction_tangent);
+};
+
+struct GatherOptions {
+    uint32_t rays = 64;            // cosine-distributed, shared out among the texel's sample points
+    uint32_t emitter_samples = 4;  // towards each light group's emitters
+    uint32_t seed = 0;
+};
+
+// Thread-safe: gather() only reads.
+class Gatherer {
+   public:
+    Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters)
+        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters) {}
+
+    // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
+    // receivers that rays hit. `hits`, when given, takes for every ray the receiver that it hit, or no_index.
+    // Unbiased: emitters are found by area and by hit, weighted by the balance heuristic (Veach 1995).
+    void gather(size_t receiver, const GatherOptions& options, const SparseLight* outgoing,
+                GroupAccumulator<Gathered>& sum, uint32_t* hits) const;
+
+   private:
+    void sampleEmitters(size_t receiver, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+
+    const RayScene& rays_;
+    const Unwrap& unwrap_;
+    const Texels& texels_;
+    const EmitterSampler& emitters_;
+};
+
+}  // namespace dimmer::cook

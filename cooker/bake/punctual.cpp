@@ -1,0 +1,40 @@
+#include <bake/punctual.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float distance_min_m = 0.01f;
+
+float window(const PunctualLight& light, float distance_m) {
+    if (!light.range_m) return 1;
+    const float ratio = distance_m / *light.range_m;
+    return std::clamp(1 - ratio * ratio * ratio * ratio, 0.0f, 1.0f);
+}
+
+float cone(const PunctualLight& light, glm::vec3 towards_light) {
+    const float scale = 1 / std::max(0.001f, light.cone_inner_cos - light.cone_outer_cos);
+    const float cos_angle = glm::dot(light.direction, -towards_light);
+    const float attenuation = std::clamp((cos_angle - light.cone_outer_cos) * scale, 0.0f, 1.0f);
+    return attenuation * attenuation;
+}
+
+}  // namespace
+
+Illumination illuminate(const PunctualLight& light, glm::vec3 point) {
+    if (light.type == LightType::Directional)
+        return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity};
+    const glm::vec3 to_light = light.position_m - point;
+    const float distance_m = glm::length(to_light);
+    if (!(distance_m > 0)) return {};
+    const glm::vec3 direction = to_light / distance_m;
+    const float clamped = std::max(distance_m, distance_min_m);
+    float factor = window(light, distance_m) / (clamped * clamped);
+    if (light.type == LightType::Spot) factor *= cone(light, direction);
+    return {direction, distance_m, light.intensity * factor};
+}
+
+}  // namespace dimmer::cook

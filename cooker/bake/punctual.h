@@ -1,0 +1,20 @@
+// Point, spot and directional lights.
+#pragma once
+
+#include <scene/scene.h>
+
+#include <glm/glm.hpp>
+
+namespace dimmer::cook {
+
+struct Illumination {
+    glm::vec3 towards_light{0};   // unit
+    float distance_m = 0;         // infinite for a directional light
+    glm::vec3 irradiance_lux{0};  // on a surface that faces the light, nothing between
+};
+
+// What `light` does at `point`. Inverse square with a least distance of 1 cm, windowed by the range; spots by the glTF
+// cone formula (KHR_lights_punctual).
+Illumination illuminate(const PunctualLight& light, glm::vec3 point);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,261 @@
+#include <charts/planar.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <tuple>
+
+namespace dimmer::cook {
+namespace {
+
+// Planes and lines are told apart at these steps: finer than any texel, coarser than 32-bit coordinates at 100 m.
+constexpr float normal_steps = 512, offset_steps_per_m = 128, direction_steps = 2048;
+constexpr float touching_m = 1e-3f;
+// Rays that look for walls between two parts of a chart run this high above the surface.
+constexpr float wall_probe_height_m = 0.01f;
+// Bilinear filtering and padding reach this far.
+constexpr float filter_reach_texels = 2;
+// A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
+constexpr float waste_max = 1.3f;
+constexpr float waste_free_texels = 16;
+
+struct Rect {
+    glm::vec2 min{1e30f}, max{-1e30f};
+    void add(glm::vec2 p) {
+        min = glm::min(min, p);
+        max = glm::max(max, p);
+    }
+    void add(const Rect& r) {
+        add(r.min);
+        add(r.max);
+    }
+    float area() const { return (max.x - min.x) * (max.y - min.y); }
+};
+
+struct Axes {
+    glm::vec3 u, v;
+    explicit Axes(glm::vec3 n) {
+        const glm::vec3 reference = std::abs(n.y) > 0.9f ? glm::vec3(0, 0, -1) : glm::vec3(0, 1, 0);
+        u = glm::normalize(glm::cross(reference, n));
+        v = glm::cross(n, u);
+    }
+    glm::vec2 on(glm::vec3 p) const { return {glm::dot(p, u), glm::dot(p, v)}; }
+};
+
+using PlaneKey = std::tuple<uint32_t, uint32_t, long, long, long, long, long>;
+
+PlaneKey planeKey(const PlanarFace& f) {
+    auto step = [](float value, float steps) { return std::lround(value * steps); };
+    return {f.group,
+            f.region,
+            step(f.texels_per_metre, 256),
+            step(f.normal.x, normal_steps),
+            step(f.normal.y, normal_steps),
+            step(f.normal.z, normal_steps),
+            step(glm::dot(f.normal, f.corners_m[0]), offset_steps_per_m)};
+}
+
+struct Contact {
+    float length_m;
+    uint32_t a, b;  // positions within the plane's list
+};
+
+// Charts of one plane: a union-find over its faces.
+class PlaneGrouper {
+   public:
+    PlaneGrouper(std::span<const PlanarFace> all, std::vector<uint32_t> ids, uint32_t side_max_texels)
+        : all_(all),
+          ids_(std::move(ids)),
+          axes_(all[ids_[0]].normal),
+          density_(all[ids_[0]].texels_per_metre),
+          side_max_(static_cast<float>(side_max_texels) / density_) {
+        for (uint32_t id : ids_) {
+            std::array<glm::vec2, 3> flat;
+            for (size_t i = 0; i < 3; ++i) flat[i] = axes_.on(all_[id].corners_m[i]);
+            flat_.push_back(flat);
+        }
+        findContacts();
+    }
+
+    std::vector<PlanarChart> charts(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
+        merge({});
+        const auto walls = findWalls(blocked);
+        if (!walls.empty()) merge(walls);
+        std::map<uint32_t, PlanarChart> by_root;
+        for (uint32_t i = 0; i < ids_.size(); ++i) {
+            const uint32_t root = find(i);
+            auto [it, fresh] = by_root.try_emplace(root);
+            if (fresh)
+                it->second = {axes_.u, axes_.v, rects_[root].min, rects_[root].max - rects_[root].min, density_, {}};
+            it->second.faces.push_back(ids_[i]);
+        }
+        std::vector<PlanarChart> out;
+        for (auto& [root, chart] : by_root) out.push_back(std::move(chart));
+        return out;
+    }
+
+   private:
+    // Edges that lie on one line and overlap with opposite directions: shared edges, T-junctions included.
+    void findContacts() {
+        struct Edge {
+            float from, to;
+            bool forward;
+            uint32_t face;
+        };
+        std::map<std::tuple<long, long, long>, std::vector<Edge>> lines;
+        for (uint32_t i = 0; i < flat_.size(); ++i)
+            for (size_t e = 0; e < 3; ++e) {
+                const glm::vec2 a = flat_[i][e], b = flat_[i][(e + 1) % 3];
+                const float length = glm::length(b - a);
+                if (length < touching_m) continue;
+                glm::vec2 d = (b - a) / length;
+                const long qx = std::lround(d.x * direction_steps);
+                const bool forward = qx > 0 || (qx == 0 && d.y > 0);
+                if (!forward) d = -d;
+                const float offset = d.x * a.y - d.y * a.x;
+                const float ta = glm::dot(d, a), tb = glm::dot(d, b);
+                lines[{std::lround(d.x * direction_steps), std::lround(d.y * direction_steps),
+                       std::lround(offset * offset_steps_per_m)}]
+                    .push_back({std::min(ta, tb), std::max(ta, tb), forward, i});
+            }
+        for (auto& [key, edges] : lines) {
+            std::ranges::sort(edges, {}, [](const Edge& e) { return std::tuple(e.from, e.to, e.face, e.forward); });
+            for (size_t a = 0; a < edges.size(); ++a)
+                for (size_t b = a + 1; b < edges.size() && edges[b].from < edges[a].to - touching_m; ++b) {
+                    const float overlap = std::min(edges[a].to, edges[b].to) - edges[b].from;
+                    if (edges[a].forward != edges[b].forward && overlap > touching_m)
+                        contacts_.push_back({overlap, edges[a].face, edges[b].face});
+                }
+        }
+        std::ranges::sort(contacts_, {}, [](const Contact& c) { return std::tuple(-c.length_m, c.a, c.b); });
+    }
+
+    uint32_t find(uint32_t i) {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+
+    // Longest contacts first, so that a doorway's strip joins one room rather than joining two rooms.
+    void merge(const std::set<std::pair<uint32_t, uint32_t>>& walls) {
+        parent_.resize(ids_.size());
+        std::iota(parent_.begin(), parent_.end(), 0u);
+        rects_.assign(ids_.size(), {});
+        members_.assign(ids_.size(), {});
+        for (uint32_t i = 0; i < ids_.size(); ++i) {
+            for (glm::vec2 p : flat_[i]) rects_[i].add(p);
+            members_[i] = {i};
+        }
+        for (const Contact& c : contacts_) {
+            uint32_t a = find(c.a), b = find(c.b);
+            if (a == b || !fitsTogether(a, b) || walled(a, b, walls)) continue;
+            if (members_[a].size() < members_[b].size()) std::swap(a, b);
+            parent_[b] = a;
+            rects_[a].add(rects_[b]);
+            members_[a].insert(members_[a].end(), members_[b].begin(), members_[b].end());
+            members_[b].clear();
+        }
+    }
+
+    bool fitsTogether(uint32_t a, uint32_t b) const {
+        Rect r = rects_[a];
+        r.add(rects_[b]);
+        const glm::vec2 size = r.max - r.min;
+        if (std::max(size.x, size.y) > side_max_) return false;
+        return r.area() <=
+               waste_max * (rects_[a].area() + rects_[b].area()) + waste_free_texels / (density_ * density_);
+    }
+
+    bool walled(uint32_t a, uint32_t b, const std::set<std::pair<uint32_t, uint32_t>>& walls) const {
+        if (walls.empty()) return false;
+        for (uint32_t i : members_[a])
+            for (uint32_t j : members_[b])
+                if (walls.contains(std::minmax(i, j))) return true;
+        return false;
+    }
+
+    // Pairs of faces of one chart that come within the filter's reach of one another with a wall between.
+    std::set<std::pair<uint32_t, uint32_t>> findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
+        std::set<std::pair<uint32_t, uint32_t>> walls;
+        const float reach = filter_reach_texels / density_;
+        for (const auto& members : members_)
+            for (size_t a = 0; a < members.size(); ++a)
+                for (size_t b = a + 1; b < members.size(); ++b)
+                    if (near(members[a], members[b], reach) && (wallBetween(members[a], members[b], reach, blocked) ||
+                                                                wallBetween(members[b], members[a], reach, blocked)))
+                        walls.insert(std::minmax(members[a], members[b]));
+        return walls;
+    }
+
+    bool near(uint32_t a, uint32_t b, float reach) const {
+        Rect ra, rb;
+        for (size_t i = 0; i < 3; ++i) {
+            ra.add(flat_[a][i]);
+            rb.add(flat_[b][i]);
+        }
+        return glm::all(glm::lessThan(ra.min, rb.max + reach)) && glm::all(glm::lessThan(rb.min, ra.max + reach));
+    }
+
+    bool wallBetween(uint32_t a, uint32_t b, float reach,
+                     const std::function<bool(glm::vec3, glm::vec3)>& blocked) const {
+        const PlanarFace& fa = all_[ids_[a]];
+        const PlanarFace& fb = all_[ids_[b]];
+        const glm::vec3 lift = fa.normal * wall_probe_height_m;
+        const glm::vec3 middle = (fa.corners_m[0] + fa.corners_m[1] + fa.corners_m[2]) / 3.0f;
+        for (size_t e = 0; e < 3; ++e)
+            for (float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
+                glm::vec3 p = glm::mix(fa.corners_m[e], fa.corners_m[(e + 1) % 3], s);
+                glm::vec3 q = nearestOn(fb, p);
+                const float distance = glm::length(q - p);
+                if (distance < touching_m || distance > reach) continue;
+                // Step off the edges, on which the wall itself may stand.
+                const glm::vec3 middle_b = (fb.corners_m[0] + fb.corners_m[1] + fb.corners_m[2]) / 3.0f;
+                p += 0.01f * (middle - p) + lift;
+                q += 0.01f * (middle_b - q) + lift;
+                if (blocked(p, q) || blocked(q, p)) return true;
+            }
+        return false;
+    }
+
+    static glm::vec3 nearestOn(const PlanarFace& f, glm::vec3 p) {
+        glm::vec3 best = f.corners_m[0];
+        float best2 = 1e30f;
+        for (size_t e = 0; e < 3; ++e) {
+            const glm::vec3 a = f.corners_m[e], ab = f.corners_m[(e + 1) % 3] - a;
+            const float s = std::clamp(glm::dot(p - a, ab) / glm::dot(ab, ab), 0.0f, 1.0f);
+            const glm::vec3 q = a + s * ab;
+            const float d2 = glm::dot(q - p, q - p);
+            if (d2 < best2) best2 = d2, best = q;
+        }
+        return best;
+    }
+
+    std::span<const PlanarFace> all_;
+    std::vector<uint32_t> ids_;
+    Axes axes_;
+    float density_, side_max_;
+    std::vector<std::array<glm::vec2, 3>> flat_;
+    std::vector<Contact> contacts_;
+    std::vector<uint32_t> parent_;
+    std::vector<Rect> rects_;
+    std::vector<std::vector<uint32_t>> members_;
+};
+
+}  // namespace
+
+std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
+                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
+    std::map<PlaneKey, std::vector<uint32_t>> planes;
+    for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
+    std::vector<PlanarChart> charts;
+    for (auto& [key, ids] : planes) {
+        auto of_plane = PlaneGrouper(faces, std::move(ids), side_max_texels).charts(blocked);
+        std::ranges::move(of_plane, std::back_inserter(charts));
+    }
+    // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
+    std::ranges::sort(charts, {}, [](const PlanarChart& c) { return c.faces[0]; });
+    return charts;
+}
+
+}  // namespace dimmer::cook

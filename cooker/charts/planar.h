@@ -1,0 +1,31 @@
+// Groups faces into planar charts.
+#pragma once
+
+#include <charts/unwrap.h>
+
+#include <functional>
+#include <span>
+
+namespace dimmer::cook {
+
+struct PlanarFace {
+    std::array<glm::vec3, 3> corners_m;  // counter-clockwise seen from the lit side
+    glm::vec3 normal;
+    float texels_per_metre;
+    uint32_t group;       // faces of different groups never share a chart
+    uint32_t region = 0;  // nor do faces of different regions
+};
+
+struct PlanarChart {
+    glm::vec3 u_axis, v_axis;  // unit; u x v = normal
+    glm::vec2 min_m, size_m;   // of the chart's rectangle, along the axes
+    float texels_per_metre;
+    std::vector<uint32_t> faces;  // indices into the input, ascending
+};
+
+// `blocked(a, b)`: something opaque stands on the straight line between two points.
+// Deterministic; O(n log n) but for charts of very many faces.
+std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
+                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked);
+
+}  // namespace dimmer::cook

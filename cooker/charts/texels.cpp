@@ -1,0 +1,249 @@
+#include <charts/texels.h>
+
+#include <bake/sampling.h>
+#include <charts/raster.h>
+#include <pack/pack_data.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+
+namespace dimmer::cook {
+namespace {
+
+// Rays and shadow rays start this far off the surface: above the rounding of coordinates at 100 m (8e-6 m) and the
+// mismatch of coplanar pieces, below any gap that matters.
+constexpr float lift_m = 5e-4f;
+// How many Halton points are tried before a texel counts as a sliver.
+constexpr uint32_t halton_tries = 64;
+constexpr uint32_t inside_test_rays = 16;
+
+struct Covered {
+    uint64_t texel;  // index over all pages
+    uint32_t face;
+    auto operator<=>(const Covered&) const = default;
+};
+
+std::vector<Covered> coverConservatively(const Unwrap& unwrap) {
+    std::vector<std::vector<Covered>> parts(unwrap.faces.size());
+    tbb::parallel_for(size_t{0}, unwrap.faces.size(), [&](size_t face) {
+        const auto& uv = unwrap.uv_texels[face];
+        const CellRange r = cellRange(uv, {unwrap.page_width, unwrap.page_height});
+        const uint64_t page = uint64_t{unwrap.charts[unwrap.face_chart[face]].page} * unwrap.page_height;
+        for (uint32_t y = r.y0; y < r.y1; ++y)
+            for (uint32_t x = r.x0; x < r.x1; ++x)
+                if (polygonArea(clipToCell(uv, x, y)) > 1e-6f)
+                    parts[face].push_back({(page + y) * unwrap.page_width + x, static_cast<uint32_t>(face)});
+    });
+    std::vector<Covered> all;
+    for (auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+    std::ranges::sort(all);
+    return all;
+}
+
+class TexelSampler {
+   public:
+    TexelSampler(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max)
+        : rays_(rays), unwrap_(unwrap), samples_max_(samples_max) {}
+
+    struct Result {
+        std::vector<SamplePoint> points;
+        float area_m2 = 0;
+        glm::vec3 reflectance{0};
+    };
+
+    Result sample(std::span<const Covered> faces) const {
+        Result result;
+        const uint64_t texel = faces[0].texel;
+        const auto x = static_cast<uint32_t>(texel % unwrap_.page_width);
+        const auto y = static_cast<uint32_t>(texel / unwrap_.page_width % unwrap_.page_height);
+        std::vector<SurfacePoint> found;
+        for (uint32_t i = 1; i <= halton_tries && found.size() < samples_max_; ++i) {
+            const glm::vec2 p(static_cast<float>(x) + radicalInverse(2, i),
+                              static_cast<float>(y) + radicalInverse(3, i));
+            for (const Covered& c : faces)
+                if (auto b = barycentric(unwrap_.uv_texels[c.face], p)) {
+                    found.push_back({c.face, *b});
+                    break;
+                }
+        }
+        float covered = 0, largest = 0;
+        SurfacePoint centroid{};
+        for (const Covered& c : faces) {
+            const auto polygon = clipToCell(unwrap_.uv_texels[c.face], x, y);
+            const float area = polygonArea(polygon);
+            covered += area;
+            result.area_m2 += area * unwrap_.texel_area_m2[c.face];
+            if (area <= largest) continue;
+            largest = area;
+            centroid = {c.face, weightsAt(c.face, mean(polygon))};
+        }
+        if (found.empty() && largest > 0) found.push_back(centroid);
+        keepUsable(found, result);
+        return result;
+    }
+
+   private:
+    struct SurfacePoint {
+        uint32_t face;
+        glm::vec2 weights;
+    };
+
+    static glm::vec2 mean(const std::vector<glm::vec2>& polygon) {
+        glm::vec2 sum(0);
+        for (glm::vec2 p : polygon) sum += p;
+        return sum / static_cast<float>(polygon.size());
+    }
+
+    glm::vec2 weightsAt(uint32_t face, glm::vec2 p) const {
+        const auto& t = unwrap_.uv_texels[face];
+        const float area = cross2d(t[1] - t[0], t[2] - t[0]);
+        const glm::vec2 w(cross2d(p - t[0], t[2] - t[0]) / area, cross2d(t[1] - t[0], p - t[0]) / area);
+        return glm::clamp(w, glm::vec2(0), glm::vec2(1));
+    }
+
+    void keepUsable(const std::vector<SurfacePoint>& found, Result& result) const {
+        const Scene& scene = rays_.scene();
+        bool dropped = false;
+        for (const SurfacePoint& s : found) {
+            const uint32_t triangle = unwrap_.faces[s.face].triangle;
+            const glm::vec3 normal = unwrap_.frames[s.face].normal;
+            const glm::vec3 position = rays_.pointOn(triangle, s.weights.x, s.weights.y) + normal * lift_m;
+            const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
+            result.reflectance += scene.materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color)) /
+                                  static_cast<float>(found.size());
+            if (insideGeometry(position, s.face))
+                dropped = true;
+            else
+                result.points.push_back({position, s.face});
+        }
+        if (dropped && result.points.size() > 1) keepOneSideOfWalls(result.points);
+    }
+
+    // A point in a closed solid sees its back faces wherever it looks. One ray decides the common case.
+    bool insideGeometry(glm::vec3 position, uint32_t face) const {
+        const TangentFrame& f = unwrap_.frames[face];
+        auto seesBack = [&](glm::vec3 direction) {
+            const auto hit = rays_.nearest(position, direction, 1e30f, 0);
+            return hit && hit->back && !doubleSided(hit->triangle);
+        };
+        if (!seesBack(f.normal)) return false;
+        uint32_t backs = 1;
+        for (uint32_t i = 1; i < inside_test_rays; ++i) {
+            const glm::vec3 d = cosineDirection(sequence2d(i, face));
+            backs += seesBack(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
+        }
+        return 2 * backs > inside_test_rays;
+    }
+
+    bool doubleSided(uint32_t triangle) const {
+        return rays_.scene().materials[rays_.triangles()[triangle].material].double_sided;
+    }
+
+    // Part of the texel lies inside a wall: of the parts on its two sides, the one with more points stays.
+    void keepOneSideOfWalls(std::vector<SamplePoint>& points) const {
+        size_t best = 0, best_count = 0;
+        std::vector<std::vector<SamplePoint>> seen(points.size());
+        for (size_t a = 0; a < points.size(); ++a) {
+            for (const SamplePoint& b : points)
+                if (&b == &points[a] || !rays_.blocked(points[a].position_m, b.position_m)) seen[a].push_back(b);
+            if (seen[a].size() > best_count) best_count = seen[a].size(), best = a;
+        }
+        points = seen[best];
+    }
+
+    const RayScene& rays_;
+    const Unwrap& unwrap_;
+    uint32_t samples_max_;
+};
+
+// Every other texel of a chart's rectangle takes the nearest receiver of the chart, found ring by ring.
+void standIn(const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& out) {
+    auto index = [&](uint32_t page, uint32_t x, uint32_t y) {
+        return (size_t{page} * unwrap.page_height + y) * unwrap.page_width + x;
+    };
+    constexpr std::array<std::array<int, 2>, 8> neighbours = {
+        {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+    std::vector<std::array<uint32_t, 2>> front, next;
+    for (const Chart& c : unwrap.charts) {
+        front.clear();
+        for (uint32_t y = c.y; y < c.y + c.height; ++y)
+            for (uint32_t x = c.x; x < c.x + c.width; ++x)
+                if (out.receiver_at[index(c.page, x, y)] != no_index) front.push_back({x, y});
+        // Bilinear filtering reaches one texel past what is covered, and covered texels may lie deeper.
+        auto needed = [&](uint32_t x, uint32_t y) {
+            for (uint32_t ny = std::max(y, c.y + 1) - 1; ny <= std::min(y + 1, c.y + c.height - 1); ++ny)
+                for (uint32_t nx = std::max(x, c.x + 1) - 1; nx <= std::min(x + 1, c.x + c.width - 1); ++nx)
+                    if (covered[index(c.page, nx, ny)]) return true;
+            return false;
+        };
+        while (!front.empty()) {
+            next.clear();
+            for (auto [x, y] : front)
+                for (auto [dx, dy] : neighbours) {
+                    const auto nx = static_cast<uint32_t>(static_cast<int>(x) + dx);
+                    const auto ny = static_cast<uint32_t>(static_cast<int>(y) + dy);
+                    if (nx - c.x >= c.width || ny - c.y >= c.height) continue;
+                    uint32_t& receiver = out.receiver_at[index(c.page, nx, ny)];
+                    if (receiver != no_index) continue;
+                    receiver = out.receiver_at[index(c.page, x, y)];
+                    next.push_back({nx, ny});
+                    if (needed(nx, ny)) out.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
+                }
+            front.swap(next);
+        }
+    }
+}
+
+}  // namespace
+
+Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max) {
+    const std::vector<Covered> cover = coverConservatively(unwrap);
+    std::vector<size_t> starts;
+    for (size_t i = 0; i < cover.size(); ++i)
+        if (i == 0 || cover[i].texel != cover[i - 1].texel) starts.push_back(i);
+    starts.push_back(cover.size());
+    const size_t candidates = starts.size() - 1;
+
+    const TexelSampler sampler(rays, unwrap, samples_max);
+    std::vector<TexelSampler::Result> results(candidates);
+    tbb::parallel_for(size_t{0}, candidates, [&](size_t i) {
+        results[i] = sampler.sample({cover.data() + starts[i], starts[i + 1] - starts[i]});
+    });
+
+    Texels out;
+    const size_t page_texels = size_t{unwrap.page_count} * unwrap.page_width * unwrap.page_height;
+    out.receiver_at.assign(page_texels, no_index);
+    std::vector<uint8_t> covered(page_texels);
+    out.first_sample.push_back(0);
+    for (size_t i = 0; i < candidates; ++i) {
+        const uint64_t texel = cover[starts[i]].texel;
+        covered[texel] = 1;
+        if (results[i].points.empty()) continue;
+        out.receiver_at[texel] = static_cast<uint32_t>(out.address.size());
+        out.address.push_back(
+            TexelAddress::pack(static_cast<uint32_t>(texel / unwrap.page_width / unwrap.page_height),
+                               static_cast<uint32_t>(texel % unwrap.page_width),
+                               static_cast<uint32_t>(texel / unwrap.page_width % unwrap.page_height)));
+        out.area_m2.push_back(results[i].area_m2);
+        out.reflectance.push_back(results[i].reflectance);
+        out.samples.insert(out.samples.end(), results[i].points.begin(), results[i].points.end());
+        out.first_sample.push_back(static_cast<uint32_t>(out.samples.size()));
+    }
+    standIn(unwrap, covered, out);
+    return out;
+}
+
+uint32_t receiverOf(const Unwrap& unwrap, const Texels& texels, const Hit& hit) {
+    const uint32_t face = unwrap.faceOf(hit.triangle, hit.back);
+    if (face == no_index) return no_index;
+    const auto& uv = unwrap.uv_texels[face];
+    const Chart& c = unwrap.charts[unwrap.face_chart[face]];
+    const glm::vec2 p = (1 - hit.u - hit.v) * uv[0] + hit.u * uv[1] + hit.v * uv[2];
+    const auto x = std::clamp(static_cast<uint32_t>(std::max(p.x, 0.0f)), c.x, c.x + c.width - 1);
+    const auto y = std::clamp(static_cast<uint32_t>(std::max(p.y, 0.0f)), c.y, c.y + c.height - 1);
+    return texels.receiver_at[(size_t{c.page} * unwrap.page_height + y) * unwrap.page_width + x];
+}
+
+}  // namespace dimmer::cook

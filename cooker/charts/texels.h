@@ -1,0 +1,45 @@
+// The receivers of a bake: lightmap texels with their sample points.
+#pragma once
+
+#include <charts/unwrap.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct SamplePoint {
+    glm::vec3 position_m;  // lifted off the surface, ready to start a ray
+    uint32_t face = 0;     // its frame gives normal and tangents
+};
+
+// A texel that holds a copy of another one: padding around charts, and texels that no light can reach.
+struct FillTexel {
+    uint32_t address = 0;  // TexelAddress
+    uint32_t source = 0;   // index of a receiver
+};
+
+struct Texels {
+    // Per receiver, structure of arrays.
+    std::vector<uint32_t> address;  // TexelAddress
+    std::vector<float> area_m2;     // lit surface inside it
+    std::vector<glm::vec3> reflectance;
+    std::vector<uint32_t> first_sample;  // one more than receivers
+    std::vector<SamplePoint> samples;
+    std::vector<FillTexel> fills;
+    std::vector<uint32_t> receiver_at;  // per page texel: its receiver or the one standing in for it; no_index: none
+
+    size_t size() const { return address.size(); }
+    uint32_t sampleCount(size_t receiver) const { return first_sample[receiver + 1] - first_sample[receiver]; }
+    const SamplePoint& sample(size_t receiver, uint32_t i) const { return samples[first_sample[receiver] + i]; }
+};
+
+// Up to `samples_max` points per texel, Halton-distributed over what the charts cover of it. Points inside closed
+// geometry are dropped, and so are points that a wall parts from the texel's others. Deterministic.
+Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max);
+
+// Which receiver a ray's hit reads; no_index for surfaces that receive no light.
+uint32_t receiverOf(const Unwrap& unwrap, const Texels& texels, const Hit& hit);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,305 @@
+#include <charts/unwrap.h>
+
+#include <charts/planar.h>
+#include <charts/raster.h>
+
+#include <fmt/format.h>
+#include <stb_rect_pack.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr uint32_t padding_texels = 1;
+// Overlaps of a file's own UVs are looked for on a grid this fine.
+constexpr uint32_t overlap_grid = 1024;
+
+// A chart before it has a place: its size with padding, and its faces' corners relative to its rectangle.
+struct Placed {
+    uint32_t width = 0, height = 0;
+    std::vector<uint32_t> faces;
+    std::vector<std::array<glm::vec2, 3>> uv_texels;
+};
+
+std::array<glm::vec3, 3> corners(const RayScene& rays, Face face) {
+    std::array<glm::vec3, 3> c = {rays.corner(face.triangle, 0), rays.corner(face.triangle, 1),
+                                  rays.corner(face.triangle, 2)};
+    if (face.back) std::swap(c[1], c[2]);
+    return c;
+}
+
+std::vector<Face> listFaces(const RayScene& rays) {
+    std::vector<Face> faces;
+    const Scene& scene = rays.scene();
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+        const LevelTriangle& triangle = rays.triangles()[t];
+        if (scene.meshes[triangle.mesh].lighting == Lighting::None) continue;
+        faces.push_back({t, false});
+        if (scene.materials[triangle.material].double_sided) faces.push_back({t, true});
+    }
+    return faces;
+}
+
+// Whether the mesh's TEXCOORD_1 is an unwrap: inside 0..1, every triangle with area, no two on one spot.
+bool validUnwrap(const SceneMesh& mesh, std::string& why) {
+    std::vector<uint8_t> taken(size_t{overlap_grid} * overlap_grid);
+    const float grid = overlap_grid;
+    for (const glm::uvec3 triangle : mesh.triangles) {
+        std::array<glm::vec2, 3> uv;
+        for (int i = 0; i < 3; ++i) {
+            uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
+            const glm::vec2 c = uv[static_cast<size_t>(i)];
+            if (!(c.x >= 0 && c.x <= 1 && c.y >= 0 && c.y <= 1)) {
+                why = "they leave 0..1";
+                return false;
+            }
+        }
+        if (std::abs(cross2d(uv[1] - uv[0], uv[2] - uv[0])) < 1e-12f) {
+            why = "a triangle has no area in them";
+            return false;
+        }
+        for (auto& c : uv) c *= grid;
+        bool overlaps = false;
+        forEachCoveredCentre(uv, {overlap_grid, overlap_grid}, [&](uint32_t x, uint32_t y) {
+            uint8_t& cell = taken[size_t{y} * overlap_grid + x];
+            overlaps = overlaps || cell != 0;
+            cell = 1;
+        });
+        if (overlaps) {
+            why = "they overlap";
+            return false;
+        }
+    }
+    return true;
+}
+
+// A chart of the file's own UVs, scaled to the wanted density on average.
+Placed fileChart(const RayScene& rays, const std::vector<Face>& faces, std::vector<uint32_t> ids, float density,
+                 uint32_t side_max) {
+    const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh];
+    double area_m2 = 0, area_uv = 0;
+    glm::vec2 low(1), high(0);
+    auto uvOf = [&](uint32_t id, int i) {
+        return mesh.uv1[mesh.triangles[rays.triangles()[faces[id].triangle].triangle][i]];
+    };
+    for (uint32_t id : ids) {
+        const auto c = corners(rays, faces[id]);
+        area_m2 += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+        area_uv += 0.5 * std::abs(cross2d(uvOf(id, 1) - uvOf(id, 0), uvOf(id, 2) - uvOf(id, 0)));
+        for (int i = 0; i < 3; ++i) low = glm::min(low, uvOf(id, i)), high = glm::max(high, uvOf(id, i));
+    }
+    float scale = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
+    const float extent = std::max(high.x - low.x, high.y - low.y);
+    scale = std::min(scale, (static_cast<float>(side_max - 2 * padding_texels) - 1) / extent);
+    const glm::vec2 size = glm::ceil((high - low) * scale);
+    Placed placed{static_cast<uint32_t>(size.x) + 2 * padding_texels,
+                  static_cast<uint32_t>(size.y) + 2 * padding_texels,
+                  std::move(ids),
+                  {}};
+    for (uint32_t id : placed.faces) {
+        std::array<glm::vec2, 3> uv;
+        for (int i = 0; i < 3; ++i)
+            uv[static_cast<size_t>(i)] = (uvOf(id, i) - low) * scale + static_cast<float>(padding_texels);
+        placed.uv_texels.push_back(uv);
+    }
+    return placed;
+}
+
+// A planar chart, its grid fitted so that the rectangle's edges fall on texel edges.
+Placed planarChart(const RayScene& rays, const std::vector<Face>& faces, const std::vector<uint32_t>& face_ids,
+                   PlanarChart chart, uint32_t side_max) {
+    const float usable = static_cast<float>(side_max - 2 * padding_texels);
+    const float largest = std::max(chart.size_m.x, chart.size_m.y);
+    const float density = std::min(chart.texels_per_metre, usable / largest);
+    const glm::vec2 texels = glm::clamp(glm::ceil(chart.size_m * density - 0.01f), glm::vec2(1), glm::vec2(usable));
+    const glm::vec2 scale = texels / glm::max(chart.size_m, glm::vec2(1e-6f));
+    Placed placed{static_cast<uint32_t>(texels.x) + 2 * padding_texels,
+                  static_cast<uint32_t>(texels.y) + 2 * padding_texels,
+                  {},
+                  {}};
+    for (uint32_t local : chart.faces) {
+        const uint32_t id = face_ids[local];
+        std::array<glm::vec2, 3> uv;
+        const auto c = corners(rays, faces[id]);
+        for (size_t i = 0; i < 3; ++i) {
+            const glm::vec2 p(glm::dot(c[i], chart.u_axis), glm::dot(c[i], chart.v_axis));
+            uv[i] = (p - chart.min_m) * scale + static_cast<float>(padding_texels);
+        }
+        if (faces[id].back) std::swap(uv[1], uv[2]);  // stored in the triangle's own corner order
+        placed.faces.push_back(id);
+        placed.uv_texels.push_back(uv);
+    }
+    return placed;
+}
+
+bool tryPack(std::vector<stbrp_rect>& rects, int width, int height) {
+    std::vector<stbrp_node> nodes(static_cast<size_t>(width));
+    stbrp_context context;
+    stbrp_init_target(&context, width, height, nodes.data(), width);
+    return stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size())) != 0;
+}
+
+std::vector<stbrp_rect> rectsOf(const std::vector<Placed>& charts, const std::vector<uint32_t>& ids) {
+    std::vector<stbrp_rect> rects;
+    for (uint32_t id : ids) {
+        stbrp_rect r{};
+        r.id = static_cast<int>(id);
+        r.w = static_cast<stbrp_coord>(charts[id].width);
+        r.h = static_cast<stbrp_coord>(charts[id].height);
+        rects.push_back(r);
+    }
+    return rects;
+}
+
+// One page as small as will do, else as many of the largest size as are needed. Sides are multiples of 64 texels.
+bool packPages(const std::vector<Placed>& charts, uint32_t page_size, Unwrap& out) {
+    constexpr uint32_t side_step = 64;
+    std::vector<uint32_t> rest(charts.size());
+    for (uint32_t i = 0; i < rest.size(); ++i) rest[i] = i;
+    out.charts.resize(charts.size());
+    auto keep = [&](const std::vector<stbrp_rect>& rects, uint32_t page) {
+        for (const stbrp_rect& r : rects)
+            if (r.was_packed)
+                out.charts[static_cast<size_t>(r.id)] = {page, static_cast<uint32_t>(r.x), static_cast<uint32_t>(r.y),
+                                                         static_cast<uint32_t>(r.w), static_cast<uint32_t>(r.h)};
+    };
+    uint64_t area = 0;
+    uint32_t side = side_step;
+    for (const Placed& c : charts) {
+        area += uint64_t{c.width} * c.height;
+        side = std::max({side, c.width, c.height});
+    }
+    auto roundUp = [](uint64_t v) { return static_cast<uint32_t>((v + side_step - 1) / side_step * side_step); };
+    side = std::max(roundUp(side), roundUp(static_cast<uint64_t>(std::sqrt(static_cast<double>(area)))));
+    for (; side <= page_size; side += side_step) {
+        auto rects = rectsOf(charts, rest);
+        if (!tryPack(rects, static_cast<int>(side), static_cast<int>(side))) continue;
+        uint32_t height = 0;
+        for (const auto& r : rects) height = std::max(height, static_cast<uint32_t>(r.y + r.h));
+        keep(rects, 0);
+        out.page_width = side;
+        out.page_height = std::min(page_size, (height + 7) / 8 * 8);
+        out.page_count = 1;
+        return true;
+    }
+    out.page_width = out.page_height = page_size;
+    for (out.page_count = 0; !rest.empty(); ++out.page_count) {
+        if (out.page_count == 256) return false;
+        auto rects = rectsOf(charts, rest);
+        tryPack(rects, static_cast<int>(page_size), static_cast<int>(page_size));
+        keep(rects, out.page_count);
+        rest.clear();
+        for (const auto& r : rects)
+            if (!r.was_packed) rest.push_back(static_cast<uint32_t>(r.id));
+        std::ranges::sort(rest);
+    }
+    return true;
+}
+
+std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& options, Unwrap& out) {
+    const Scene& scene = rays.scene();
+    std::vector<bool> use_file_uv(scene.meshes.size());
+    for (size_t m = 0; m < scene.meshes.size(); ++m) {
+        const SceneMesh& mesh = scene.meshes[m];
+        std::string why;
+        if (mesh.uv1.empty() || mesh.triangles.empty() || mesh.lighting == Lighting::Dynamic) continue;
+        use_file_uv[m] = validUnwrap(mesh, why);
+        if (!use_file_uv[m])
+            out.warnings.push_back(fmt::format("{}: node '{}': TEXCOORD_1 is no lightmap unwrap ({}); charts were made",
+                                               scene.file, mesh.node, why));
+    }
+    std::vector<Placed> charts;
+    std::vector<PlanarFace> planar;
+    std::vector<uint32_t> planar_ids;
+    std::map<uint32_t, std::vector<uint32_t>> file_faces;
+    for (uint32_t id = 0; id < out.faces.size(); ++id) {
+        const Face face = out.faces[id];
+        const uint32_t m = rays.triangles()[face.triangle].mesh;
+        const SceneMesh& mesh = scene.meshes[m];
+        if (use_file_uv[m] && !face.back) {
+            file_faces[m].push_back(id);
+            continue;
+        }
+        const glm::vec3 normal = rays.triangles()[face.triangle].normal;
+        // Doors move, so they share no chart with the level.
+        planar.push_back(
+            {corners(rays, face), face.back ? -normal : normal,
+             mesh.texels_per_metre.value_or(options.texels_per_metre), mesh.door ? *mesh.door + 1 : 0,
+             mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[rays.triangles()[face.triangle].triangle]});
+        planar_ids.push_back(id);
+    }
+    for (auto& [m, ids] : file_faces)
+        charts.push_back(fileChart(rays, out.faces, std::move(ids),
+                                   scene.meshes[m].texels_per_metre.value_or(options.texels_per_metre),
+                                   options.page_size));
+    auto blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
+    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, blocked))
+        charts.push_back(planarChart(rays, out.faces, planar_ids, std::move(c), options.page_size));
+    return charts;
+}
+
+}  // namespace
+
+TangentFrame tangentFrame(const std::array<glm::vec3, 3>& p, const std::array<glm::vec2, 3>& uv, glm::vec3 normal,
+                          float& texel_area_m2) {
+    const glm::vec3 e1 = p[1] - p[0], e2 = p[2] - p[0];
+    const glm::vec2 d1 = uv[1] - uv[0], d2 = uv[2] - uv[0];
+    const float det = cross2d(d1, d2);
+    const float inverse = std::abs(det) > 1e-20f ? 1 / det : 0;
+    const glm::vec3 along_u = (e1 * d2.y - e2 * d1.y) * inverse, along_v = (e2 * d1.x - e1 * d2.x) * inverse;
+    texel_area_m2 = glm::length(glm::cross(along_u, along_v));
+    glm::vec3 tangent = along_u - normal * glm::dot(normal, along_u);
+    const float length = glm::length(tangent);
+    if (!(length > 0)) {
+        const glm::vec3 any = std::abs(normal.x) > 0.9f ? glm::vec3(0, 1, 0) : glm::vec3(1, 0, 0);
+        const glm::vec3 b = glm::normalize(glm::cross(normal, any));
+        return {glm::cross(b, normal), b, normal};
+    }
+    tangent /= length;
+    const glm::vec3 bitangent = glm::cross(normal, tangent);
+    return {tangent, glm::dot(bitangent, along_v) < 0 ? -bitangent : bitangent, normal};
+}
+
+Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
+    Unwrap out;
+    out.faces = listFaces(rays);
+    if (out.faces.empty())
+        return fail(ErrorCode::BadInput, rays.scene().file +
+                                             ": no mesh receives a lightmap; give at least one node dimmer_lighting "
+                                             "'lightmap' or remove 'none' and 'dynamic'");
+    out.front_face.assign(rays.triangles().size(), no_index);
+    out.back_face.assign(rays.triangles().size(), no_index);
+    for (uint32_t id = 0; id < out.faces.size(); ++id)
+        (out.faces[id].back ? out.back_face : out.front_face)[out.faces[id].triangle] = id;
+
+    const std::vector<Placed> charts = makeCharts(rays, options, out);
+    if (!packPages(charts, options.page_size, out))
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: the lightmap needs more than 256 pages of {} x {} texels; lower "
+                                "lightmaps.texels_per_metre or raise lightmaps.page_size",
+                                rays.scene().file, options.page_size, options.page_size));
+
+    const size_t count = out.faces.size();
+    out.uv_texels.resize(count);
+    out.face_chart.resize(count);
+    out.frames.resize(count);
+    out.texel_area_m2.resize(count);
+    for (uint32_t c = 0; c < charts.size(); ++c)
+        for (size_t i = 0; i < charts[c].faces.size(); ++i) {
+            const uint32_t id = charts[c].faces[i];
+            const Face face = out.faces[id];
+            for (size_t k = 0; k < 3; ++k)
+                out.uv_texels[id][k] = charts[c].uv_texels[i][k] + glm::vec2(out.charts[c].x, out.charts[c].y);
+            out.face_chart[id] = c;
+            const glm::vec3 normal = rays.triangles()[face.triangle].normal;
+            const std::array<glm::vec3, 3> p = {rays.corner(face.triangle, 0), rays.corner(face.triangle, 1),
+                                                rays.corner(face.triangle, 2)};
+            out.frames[id] = tangentFrame(p, out.uv_texels[id], face.back ? -normal : normal, out.texel_area_m2[id]);
+        }
+    return out;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,61 @@
+// Charts: which texel of which lightmap page every lit face gets.
+#pragma once
+
+#include <trace/ray_scene.h>
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+inline constexpr uint32_t no_index = UINT32_MAX;
+
+// One lit side of a level triangle. Double-sided materials have two.
+struct Face {
+    uint32_t triangle = 0;
+    bool back = false;
+};
+
+// A rectangle of texels on a page; its outermost ring is padding for bilinear filtering.
+struct Chart {
+    uint32_t page = 0, x = 0, y = 0, width = 0, height = 0;
+};
+
+// A right- or left-handed tangent frame: `tangent` is the direction of increasing u, `bitangent` that of increasing v,
+// made perpendicular to the normal and to each other. The shader's twin is dimmer_tangent_frame in sample.glsl.
+struct TangentFrame {
+    glm::vec3 tangent, bitangent, normal;
+};
+
+// The frame of a triangle from its corners' positions and lightmap UVs (in texels) and its unit normal; also the world
+// area of one texel.
+TangentFrame tangentFrame(const std::array<glm::vec3, 3>& positions_m, const std::array<glm::vec2, 3>& uv_texels,
+                          glm::vec3 normal, float& texel_area_m2);
+
+struct Unwrap {
+    uint32_t page_width = 0, page_height = 0, page_count = 0;
+    std::vector<Face> faces;
+    std::vector<std::array<glm::vec2, 3>> uv_texels;  // per face: its corners on the page, in texels
+    std::vector<uint32_t> face_chart;
+    std::vector<TangentFrame> frames;             // per face
+    std::vector<float> texel_area_m2;             // per face
+    std::vector<uint32_t> front_face, back_face;  // per level triangle; no_index where unlit
+    std::vector<Chart> charts;
+    std::vector<std::string> warnings;
+
+    uint32_t faceOf(uint32_t triangle, bool back) const { return (back ? back_face : front_face)[triangle]; }
+};
+
+struct UnwrapOptions {
+    float texels_per_metre = 4;
+    uint32_t page_size = 2048;  // largest side of a page, at most 4096
+};
+
+// TEXCOORD_1 is used where it is a valid unwrap; everything else gets planar charts: coplanar faces that share an
+// edge, as long as no wall stands between parts that come close to one another (filtering would leak through it).
+Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options);
+
+}  // namespace dimmer::cook

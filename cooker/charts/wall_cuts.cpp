@@ -1,0 +1,299 @@
+#include <charts/wall_cuts.h>
+
+#include <charts/planar.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float probe_height_m = 0.01f;  // walls are looked for this high above the plane
+constexpr float same_line_m = 2e-3f;
+constexpr float reach_texels = 2.5f;    // thinner than this leaks: bilinear filtering plus half a texel of averaging
+constexpr float length_min_texels = 3;  // a table's leg is no wall
+constexpr float margin_m = 5e-3f;       // a cut this close to a rectangle's edge parts nothing
+
+// The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
+struct Trace {
+    int axis;
+    float at, from, to;
+    bool forward;  // its front looks towards larger coordinates
+};
+
+struct Cut {
+    int axis = 0;
+    float at = 0, from = 0, to = 0;
+};
+
+// A convex piece of a level triangle in its chart's plane.
+struct Piece {
+    uint32_t face;
+    std::vector<glm::vec2> corners;
+};
+
+struct Source {
+    uint32_t mesh, triangle;
+};
+
+float area(const std::vector<glm::vec2>& p) {
+    float twice = 0;
+    for (size_t i = 2; i < p.size(); ++i) {
+        const glm::vec2 a = p[i - 1] - p[0], b = p[i] - p[0];
+        twice += a.x * b.y - a.y * b.x;
+    }
+    return 0.5f * std::abs(twice);
+}
+
+// The part of a convex polygon on one side of a line.
+std::vector<glm::vec2> clip(const std::vector<glm::vec2>& polygon, const Cut& cut, float sign) {
+    std::vector<glm::vec2> out;
+    for (size_t i = 0; i < polygon.size(); ++i) {
+        const glm::vec2 a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+        const float da = sign * (a[cut.axis] - cut.at), db = sign * (b[cut.axis] - cut.at);
+        if (da >= 0) out.push_back(a);
+        if ((da > 0 && db < 0) || (da < 0 && db > 0)) {
+            glm::vec2 p = a + (b - a) * (da / (da - db));
+            p[cut.axis] = cut.at;
+            out.push_back(p);
+        }
+    }
+    return out;
+}
+
+class WallCutter {
+   public:
+    WallCutter(Scene& scene, float texels_per_metre) : scene_(scene) {
+        for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
+            const SceneMesh& mesh = scene.meshes[m];
+            if (mesh.lighting == Lighting::Dynamic || mesh.lighting == Lighting::None) continue;
+            for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+                std::array<glm::vec3, 3> c;
+                for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];
+                const glm::vec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+                faces_.push_back(
+                    {c, normal, mesh.texels_per_metre.value_or(texels_per_metre), mesh.door ? *mesh.door + 1 : 0});
+                sources_.push_back({m, t});
+                cuttable_.push_back(mesh.uv1.empty());
+                blocks_.push_back(scene.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque);
+            }
+        }
+    }
+
+    void run() {
+        constexpr uint32_t no_side_limit = 1u << 20;
+        const auto charts = planarCharts(faces_, no_side_limit, [](glm::vec3, glm::vec3) { return false; });
+        std::vector<std::vector<std::vector<Piece>>> parts(charts.size());
+        tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
+        uint32_t region = 0;
+        std::map<uint32_t, Replacements> by_mesh;
+        for (size_t c = 0; c < charts.size(); ++c) {
+            if (parts[c].size() < 2) continue;
+            for (const auto& part : parts[c]) {
+                ++region;
+                for (const Piece& piece : part)
+                    by_mesh[sources_[piece.face].mesh][sources_[piece.face].triangle].push_back(
+                        {piece, region, &charts[c]});
+            }
+        }
+        for (const auto& [mesh, replacements] : by_mesh) rebuild(scene_.meshes[mesh], replacements);
+    }
+
+   private:
+    struct Replacement {
+        Piece piece;
+        uint32_t region;
+        const PlanarChart* chart;
+    };
+    using Replacements = std::map<uint32_t, std::vector<Replacement>>;
+
+    std::vector<std::vector<Piece>> partsOf(const PlanarChart& chart) const {
+        for (uint32_t face : chart.faces)
+            if (!cuttable_[face]) return {};
+        const std::vector<Cut> cuts = findCuts(chart);
+        if (cuts.empty()) return {};
+        std::vector<Piece> all;
+        for (uint32_t face : chart.faces) {
+            Piece piece{face, {}};
+            for (glm::vec3 p : faces_[face].corners_m)
+                piece.corners.push_back({glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)});
+            all.push_back(std::move(piece));
+        }
+        std::vector<std::vector<Piece>> done;
+        split(std::move(all), cuts, chart.texels_per_metre, done);
+        return done;
+    }
+
+    // Where pairs of surfaces, back to back and close together, stand on the chart's plane.
+    std::vector<Cut> findCuts(const PlanarChart& chart) const {
+        const float reach_m = reach_texels / chart.texels_per_metre;
+        const std::vector<Trace> traces = findTraces(chart);
+        std::vector<Cut> cuts;
+        for (const Trace& a : traces)
+            for (const Trace& b : traces) {
+                // A solid between a's front, looking back, and b's, looking forward.
+                if (a.axis != b.axis || a.forward || !b.forward) continue;
+                if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
+                const float from = std::max(a.from, b.from), to = std::min(a.to, b.to);
+                if (to - from > same_line_m) cuts.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
+            }
+        return joinCuts(std::move(cuts));
+    }
+
+    std::vector<Trace> findTraces(const PlanarChart& chart) const {
+        const PlanarFace& any = faces_[chart.faces[0]];
+        const float height = glm::dot(any.normal, any.corners_m[0]) + probe_height_m;
+        const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
+        std::vector<Trace> traces;
+        for (uint32_t f = 0; f < faces_.size(); ++f) {
+            if (!blocks_[f]) continue;
+            const PlanarFace& face = faces_[f];
+            std::array<float, 3> d;
+            for (size_t i = 0; i < 3; ++i) d[i] = glm::dot(any.normal, face.corners_m[i]) - height;
+            if ((d[0] > 0) == (d[1] > 0) && (d[1] > 0) == (d[2] > 0)) continue;
+            std::array<glm::vec2, 2> ends;
+            size_t n = 0;
+            for (size_t i = 0; i < 3 && n < 2; ++i) {
+                const size_t j = (i + 1) % 3;
+                if ((d[i] > 0) == (d[j] > 0)) continue;
+                const glm::vec3 p = glm::mix(face.corners_m[i], face.corners_m[j], d[i] / (d[i] - d[j]));
+                ends[n++] = {glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)};
+            }
+            if (n < 2) continue;
+            const glm::vec2 normal(glm::dot(face.normal, chart.u_axis), glm::dot(face.normal, chart.v_axis));
+            for (int axis = 0; axis < 2; ++axis) {
+                if (std::abs(ends[0][axis] - ends[1][axis]) > same_line_m) continue;
+                const int along = 1 - axis;
+                Trace t{axis, 0.5f * (ends[0][axis] + ends[1][axis]),
+                        std::max(low[along], std::min(ends[0][along], ends[1][along])),
+                        std::min(high[along], std::max(ends[0][along], ends[1][along])), normal[axis] > 0};
+                if (t.to - t.from < same_line_m || t.at < low[axis] - margin_m || t.at > high[axis] + margin_m)
+                    continue;
+                traces.push_back(t);
+                const Source s = sources_[f];
+                if (!scene_.materials[scene_.meshes[s.mesh].triangle_materials[s.triangle]].double_sided) continue;
+                t.forward = !t.forward;
+                traces.push_back(t);
+            }
+        }
+        return traces;
+    }
+
+    // Pieces of one wall (its triangles, its faces) become one cut.
+    static std::vector<Cut> joinCuts(std::vector<Cut> cuts) {
+        std::ranges::sort(cuts, {}, [](const Cut& c) { return std::tuple(c.axis, c.at, c.from, c.to); });
+        std::vector<Cut> joined;
+        for (const Cut& c : cuts) {
+            auto same = std::ranges::find_if(joined, [&](const Cut& o) {
+                return o.axis == c.axis && std::abs(o.at - c.at) < same_line_m && c.from <= o.to + same_line_m &&
+                       o.from <= c.to + same_line_m;
+            });
+            if (same == joined.end()) {
+                joined.push_back(c);
+                continue;
+            }
+            same->from = std::min(same->from, c.from);
+            same->to = std::max(same->to, c.to);
+        }
+        return joined;
+    }
+
+    // The longest wall first; the others go on in the halves that they stand in.
+    void split(std::vector<Piece> pieces, const std::vector<Cut>& cuts, float texels_per_metre,
+               std::vector<std::vector<Piece>>& done) const {
+        glm::vec2 low(1e30f), high(-1e30f);
+        for (const Piece& p : pieces)
+            for (glm::vec2 c : p.corners) low = glm::min(low, c), high = glm::max(high, c);
+        const Cut* best = nullptr;
+        float best_length = 0;
+        for (const Cut& c : cuts) {
+            const int along = 1 - c.axis;
+            if (c.at < low[c.axis] + margin_m || c.at > high[c.axis] - margin_m) continue;
+            const float length = std::min(c.to, high[along]) - std::max(c.from, low[along]);
+            const float needed = std::min(length_min_texels / texels_per_metre, 0.5f * (high[along] - low[along]));
+            if (length < needed || length <= best_length) continue;
+            best = &c;
+            best_length = length;
+        }
+        if (!best) {
+            done.push_back(std::move(pieces));
+            return;
+        }
+        for (float sign : {-1.0f, 1.0f}) {
+            std::vector<Piece> side;
+            for (const Piece& p : pieces) {
+                Piece half{p.face, clip(p.corners, *best, sign)};
+                if (half.corners.size() >= 3 && area(half.corners) > 1e-8f) side.push_back(std::move(half));
+            }
+            if (!side.empty()) split(std::move(side), cuts, texels_per_metre, done);
+        }
+    }
+
+    // Replaces the cut triangles of a mesh by their pieces, as fans.
+    static void rebuild(SceneMesh& mesh, const Replacements& replacements) {
+        std::vector<glm::uvec3> triangles;
+        std::vector<uint32_t> materials, regions;
+        for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+            const glm::uvec3 index = mesh.triangles[t];
+            const auto it = replacements.find(t);
+            if (it == replacements.end()) {
+                triangles.push_back(index);
+                materials.push_back(mesh.triangle_materials[t]);
+                regions.push_back(0);
+                continue;
+            }
+            for (const Replacement& r : it->second) {
+                std::vector<uint32_t> corners;
+                for (glm::vec2 p : r.piece.corners) corners.push_back(addVertex(mesh, index, *r.chart, p));
+                for (size_t i = 2; i < corners.size(); ++i) {
+                    const glm::vec3 a = mesh.positions_m[corners[0]], b = mesh.positions_m[corners[i - 1]],
+                                    c = mesh.positions_m[corners[i]];
+                    if (!(glm::length(glm::cross(b - a, c - a)) > 1e-9f)) continue;
+                    triangles.push_back({corners[0], corners[i - 1], corners[i]});
+                    materials.push_back(mesh.triangle_materials[t]);
+                    regions.push_back(r.region);
+                }
+            }
+        }
+        mesh.triangles = std::move(triangles);
+        mesh.triangle_materials = std::move(materials);
+        mesh.triangle_regions = std::move(regions);
+    }
+
+    static uint32_t addVertex(SceneMesh& mesh, glm::uvec3 index, const PlanarChart& chart, glm::vec2 p) {
+        std::array<glm::vec2, 3> flat;
+        for (int i = 0; i < 3; ++i) {
+            const glm::vec3 corner = mesh.positions_m[index[i]];
+            flat[static_cast<size_t>(i)] = {glm::dot(corner, chart.u_axis), glm::dot(corner, chart.v_axis)};
+            if (flat[static_cast<size_t>(i)] == p) return index[i];
+        }
+        auto cross = [](glm::vec2 a, glm::vec2 b) { return a.x * b.y - a.y * b.x; };
+        const float whole = cross(flat[1] - flat[0], flat[2] - flat[0]);
+        const float u = cross(p - flat[0], flat[2] - flat[0]) / whole,
+                    v = cross(flat[1] - flat[0], p - flat[0]) / whole;
+        auto blend = [&](const auto& values) {
+            return (1 - u - v) * values[index.x] + u * values[index.y] + v * values[index.z];
+        };
+        mesh.positions_m.push_back(blend(mesh.positions_m));
+        mesh.normals.push_back(glm::normalize(blend(mesh.normals)));
+        if (!mesh.uv0.empty()) mesh.uv0.push_back(blend(mesh.uv0));
+        return static_cast<uint32_t>(mesh.positions_m.size() - 1);
+    }
+
+    Scene& scene_;
+    std::vector<PlanarFace> faces_;
+    std::vector<Source> sources_;
+    std::vector<bool> cuttable_, blocks_;
+};
+
+}  // namespace
+
+void cutAtWalls(Scene& scene, float texels_per_metre) {
+    WallCutter(scene, texels_per_metre).run();
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,94 @@
+#include <cluster/cluster.h>
+
+#include <encode/encode.h>
+
+#include <algorithm>
+#include <map>
+
+namespace dimmer::cook {
+namespace {
+
+// A texel of a page, whether baked or a copy.
+struct Target {
+    uint64_t order;  // page, tile row, tile column, then inside the tile
+    uint32_t address;
+    uint32_t source;  // receiver whose light it shows
+};
+
+uint64_t tileOrder(uint32_t address) {
+    const uint64_t x = TexelAddress::x(address), y = TexelAddress::y(address);
+    return uint64_t{TexelAddress::page(address)} << 32 | (y >> 3) << 20 | (x >> 3) << 8 | (y & 7) << 3 | (x & 7);
+}
+
+std::vector<Target> listTargets(const Texels& texels) {
+    std::vector<Target> targets;
+    targets.reserve(texels.size() + texels.fills.size());
+    for (uint32_t i = 0; i < texels.size(); ++i)
+        targets.push_back({tileOrder(texels.address[i]), texels.address[i], i});
+    for (const FillTexel& f : texels.fills) targets.push_back({tileOrder(f.address), f.address, f.source});
+    std::ranges::sort(targets, {}, &Target::order);
+    return targets;
+}
+
+size_t pageIndex(const PackData& pack, uint32_t address) {
+    return (size_t{TexelAddress::page(address)} * pack.page_height + TexelAddress::y(address)) * pack.page_width +
+           TexelAddress::x(address);
+}
+
+void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receivers, PackData& pack) {
+    Cluster c{.first_receiver = static_cast<uint32_t>(pack.addresses.size()) - receivers,
+              .receiver_count = receivers,
+              .first_batch = static_cast<uint32_t>(pack.batches.size()),
+              .batch_count = 0,
+              .first_term = static_cast<uint32_t>(pack.terms.size()),
+              .term_count = static_cast<uint32_t>(contributions.size())};
+    for (uint32_t first = 0; first < receivers; first += batch_receivers_max, ++c.batch_count)
+        pack.batches.push_back({c.first_receiver + first, std::min(batch_receivers_max, receivers - first)});
+    for (uint32_t k : contributions) {
+        pack.terms.push_back({k, pack.contributions[k].receivers});  // relative to the contribution for now
+        pack.contributions[k].receivers += receivers;
+    }
+    pack.clusters.push_back(c);
+}
+
+}  // namespace
+
+void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
+    const std::vector<Target> targets = listTargets(texels);
+    pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width,
+                           encodeTexel({}, pack.exposure));
+    std::map<std::vector<uint32_t>, std::vector<uint32_t>> members;  // contributions -> targets
+    std::vector<uint32_t> signature;
+    for (uint32_t t = 0; t < targets.size(); ++t) {
+        signature.clear();
+        for (const ReceiverLight& l : baked.light.row(targets[t].source)) {
+            if (l.group == always_group)
+                pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, pack.exposure);
+            else
+                signature.push_back(l.group - 1);
+        }
+        if (!signature.empty()) members[signature].push_back(t);
+    }
+    // Clusters in page order, so that neighbours in the file are neighbours on the page.
+    std::vector<const std::pair<const std::vector<uint32_t>, std::vector<uint32_t>>*> order;
+    for (const auto& cluster : members) order.push_back(&cluster);
+    std::ranges::sort(order, {}, [](const auto* c) { return c->second.front(); });
+
+    std::vector<std::vector<TexelRecord>> payloads(pack.contributions.size());
+    for (const auto* cluster : order) {
+        for (uint32_t t : cluster->second) {
+            pack.addresses.push_back(targets[t].address);
+            for (const ReceiverLight& l : baked.light.row(targets[t].source))
+                if (l.group != always_group) payloads[l.group - 1].push_back(encodeTexel(l.light, pack.exposure));
+        }
+        appendCluster(cluster->first, static_cast<uint32_t>(cluster->second.size()), pack);
+    }
+    std::vector<uint32_t> first_record;
+    for (const auto& payload : payloads) {
+        first_record.push_back(static_cast<uint32_t>(pack.payload.size()));
+        pack.payload.insert(pack.payload.end(), payload.begin(), payload.end());
+    }
+    for (ClusterTerm& term : pack.terms) term.first_record += first_record[term.contribution];
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,77 @@
+#include <pipeline/budget.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr uint64_t record_bytes = sizeof(TexelRecord), address_bytes = 4;
+constexpr uint64_t work_item_bytes = 16, work_term_bytes = 8, weight_bytes = 16;
+
+std::string megabytes(uint64_t bytes) {
+    return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
+}
+
+std::string largestElements(const PackData& pack, const PackCost& cost) {
+    std::vector<ElementCost> by_size = cost.elements;
+    std::ranges::stable_sort(by_size, [](const auto& a, const auto& b) { return a.bytes > b.bytes; });
+    std::vector<std::string> names;
+    for (size_t i = 0; i < std::min<size_t>(3, by_size.size()); ++i)
+        names.push_back(fmt::format("'{}' {}", pack.elements[by_size[i].element].name, megabytes(by_size[i].bytes)));
+    return fmt::format("{}", fmt::join(names, ", "));
+}
+
+}  // namespace
+
+PackCost costOf(const PackData& pack) {
+    PackCost cost;
+    const uint64_t receivers = pack.addresses.size();
+    cost.base_lightmap = pack.base_pages.size() * record_bytes;
+    cost.dynamic = (pack.payload.size() + receivers) * record_bytes;
+    cost.ancillary = receivers * address_bytes + pack.batches.size() * work_item_bytes +
+                     pack.terms.size() * work_term_bytes + pack.contributions.size() * weight_bytes;
+    for (const Mesh& m : pack.meshes)
+        cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
+    for (uint32_t e = 0; e < pack.elements.size(); ++e) {
+        ElementCost element{e, 0, 0};
+        for (const Contribution& c : pack.contributions) {
+            const bool holds = c.light_set == e || std::ranges::count(c.doors_open, e) > 0 ||
+                               std::ranges::count(c.doors_closed, e) > 0;
+            if (holds) element.receivers += c.receivers;
+        }
+        element.bytes = element.receivers * record_bytes;
+        cost.elements.push_back(element);
+    }
+    cost.overlap_histogram.assign(1, pack.base_pages.size() - receivers);
+    for (const Cluster& c : pack.clusters) {
+        if (c.term_count >= cost.overlap_histogram.size()) cost.overlap_histogram.resize(c.term_count + 1);
+        cost.overlap_histogram[c.term_count] += c.receiver_count;
+    }
+    return cost;
+}
+
+Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Profile& profile) {
+    std::vector<std::string> over;
+    auto check = [&](std::string_view what, uint64_t bytes, uint64_t budget) {
+        if (budget > 0 && bytes > budget)
+            over.push_back(fmt::format("{}: {} of {}, {} too much", what, megabytes(bytes), megabytes(budget),
+                                       megabytes(bytes - budget)));
+    };
+    check("total", cost.device(), profile.budget_total);
+    check("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
+    check("dynamic records", cost.dynamic, profile.budget_dynamic);
+    for (const ElementCost& e : cost.elements)
+        check(fmt::format("element '{}'", pack.elements[e.element].name), e.bytes, profile.budget_per_element);
+    if (over.empty()) return {};
+    std::string holders;
+    if (!cost.elements.empty()) holders = "; the largest sets: " + largestElements(pack, cost);
+    return fail(ErrorCode::OverBudget,
+                fmt::format("over budget, nothing was written: {}{}. Lower lightmaps.texels_per_metre, raise "
+                            "records.threshold, or raise the budget",
+                            fmt::join(over, "; "), holders));
+}
+
+}  // namespace dimmer::cook

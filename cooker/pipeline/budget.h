@@ -1,0 +1,33 @@
+// What a pack costs at run time, by category and by element, against a profile's budgets.
+#pragma once
+
+#include <pack/pack_data.h>
+#include <pipeline/profile.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct ElementCost {
+    uint32_t element = 0;  // index into PackData::elements
+    uint64_t receivers = 0, bytes = 0;
+};
+
+// Device memory in bytes.
+struct PackCost {
+    uint64_t base_lightmap = 0;  // the page images
+    uint64_t dynamic = 0;        // records of every contribution, and the base of the receivers that they touch
+    uint64_t ancillary = 0;      // addresses, weights and the work lists of the largest update
+    uint64_t meshes = 0;         // host memory: what the pack hands to the engine
+    uint64_t device() const { return base_lightmap + dynamic + ancillary; }
+    std::vector<ElementCost> elements;
+    std::vector<uint64_t> overlap_histogram;  // texels by number of contributions, from 0
+};
+
+PackCost costOf(const PackData& pack);
+
+// An error of ErrorCode::OverBudget that says what is over, by how much, and who holds the most.
+Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Profile& profile);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,161 @@
+#include <pipeline/cook.h>
+
+#include <bake/bake.h>
+#include <charts/texels.h>
+#include <charts/unwrap.h>
+#include <charts/wall_cuts.h>
+#include <cluster/cluster.h>
+#include <encode/encode.h>
+#include <pipeline/budget.h>
+#include <pipeline/level_meshes.h>
+#include <trace/ray_scene.h>
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+
+#include <chrono>
+
+namespace dimmer::cook {
+namespace {
+
+class Stopwatch {
+   public:
+    Stopwatch(CookStats& stats, std::string stage) : stats_(stats), stage_(std::move(stage)) {}
+    ~Stopwatch() {
+        stats_.seconds[stage_] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+    }
+
+   private:
+    CookStats& stats_;
+    std::string stage_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+uint64_t peakBytes() {
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
+    return {.series_rays = quality.series_rays,
+            .final_rays = quality.rays,
+            .emitter_samples = quality.emitter_samples,
+            .bounces_max = quality.bounces,
+            .tail_max = quality.tolerance,
+            .threshold = profile.threshold};
+}
+
+// Elements and contributions: one contribution per light set, until doors have their own.
+void describeElements(const Scene& scene, const Baked& baked, PackData& pack, CookStats& stats) {
+    for (const SceneLightSet& set : scene.light_sets)
+        pack.elements.push_back({set.name, ElementKind::LightSet, set.max_weight});
+    for (const SceneDoor& door : scene.doors) pack.elements.push_back({door.name, ElementKind::Door, 1});
+    for (uint32_t s = 0; s < scene.light_sets.size(); ++s) {
+        const GroupReport& report = baked.groups[1 + s];
+        pack.contributions.push_back({.light_set = s,
+                                      .doors_open = {},
+                                      .doors_closed = {},
+                                      .receivers = 0,
+                                      .energy_dropped = static_cast<float>(report.energy_dropped)});
+        if (report.receivers == 0)
+            stats.warnings.push_back(fmt::format("{}: light set '{}' reaches no surface; it is kept, and does nothing",
+                                                 scene.file, scene.light_sets[s].name));
+    }
+}
+
+void describePlaces(const Scene& scene, PackData& pack) {
+    for (const SceneViewpoint& v : scene.viewpoints)
+        pack.viewpoints.push_back({v.name,
+                                   {v.position_m.x, v.position_m.y, v.position_m.z},
+                                   {v.forward.x, v.forward.y, v.forward.z},
+                                   v.vertical_fov_rad});
+}
+
+}  // namespace
+
+Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
+                             CookStats& stats) {
+    const Quality* quality = profile.quality(quality_name);
+    if (!quality)
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("there is no quality '{}'; take draft, preview or final", quality_name));
+    PackData pack;
+    progress.stage("charts", 2);
+    std::optional<RayScene> rays;
+    Unwrap charts;
+    Texels texels;
+    {
+        Stopwatch watch(stats, "charts");
+        cutAtWalls(scene, profile.texels_per_metre);
+        rays.emplace(scene);
+        progress.advance(1);
+        auto unwrapped = unwrap(*rays, {profile.texels_per_metre, profile.page_size});
+        if (!unwrapped) return std::unexpected(unwrapped.error());
+        charts = std::move(*unwrapped);
+        texels = sampleTexels(*rays, charts, quality->samples_per_texel);
+        progress.advance(1);
+    }
+    stats.warnings.insert(stats.warnings.end(), charts.warnings.begin(), charts.warnings.end());
+    if (texels.size() == 0)
+        return fail(ErrorCode::BadInput, scene.file +
+                                             ": every surface lies inside closed geometry, facing inwards; "
+                                             "check the winding of the level's triangles");
+    Baked baked;
+    {
+        Stopwatch watch(stats, "bake");
+        baked = bake(*rays, charts, texels, bakeSettings(profile, *quality), progress);
+    }
+    stats.rays = baked.rays;
+    stats.bounces = baked.bounces;
+    for (const std::string& w : baked.warnings) stats.warnings.push_back(scene.file + ": " + w);
+    {
+        Stopwatch watch(stats, "encode");
+        progress.stage("encode", 1);
+        pack.page_width = charts.page_width;
+        pack.page_height = charts.page_height;
+        pack.page_count = charts.page_count;
+        describeElements(scene, baked, pack, stats);
+        std::vector<float> max_weights = {1};
+        for (const SceneLightSet& set : scene.light_sets) max_weights.push_back(set.max_weight);
+        pack.exposure = chooseExposure(baked, max_weights);
+        buildClusters(texels, baked, pack);
+        pack.meshes = levelMeshes(*rays, charts);
+        describePlaces(scene, pack);
+        pack.settings_json = profile.settingsJson(quality_name);
+        progress.advance(1);
+    }
+    progress.finish();
+    return pack;
+}
+
+Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
+    std::optional<tbb::global_control> limit;
+    if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
+    const auto profile = loadProfile(options.profile);
+    if (!profile) return std::unexpected(profile.error());
+    CookResult result;
+    Expected<Scene> scene;
+    {
+        Stopwatch watch(result.stats, "import");
+        scene = importLevel(options.level);
+    }
+    if (!scene) return std::unexpected(scene.error());
+    result.stats.warnings = scene->warnings;
+    auto pack = cookScene(*scene, *profile, options.quality, progress, result.stats);
+    if (!pack) return std::unexpected(pack.error());
+    result.pack = std::move(*pack);
+    if (auto ok = checkBudgets(result.pack, costOf(result.pack), *profile); !ok) return std::unexpected(ok.error());
+    {
+        Stopwatch watch(result.stats, "write");
+        const auto bytes = packBytes(result.pack);
+        result.file_bytes = bytes.size();
+        if (auto ok = writeFileAtomically(options.pack, bytes); !ok) return std::unexpected(ok.error());
+    }
+    result.stats.peak_bytes = peakBytes();
+    return result;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,45 @@
+// The whole cook: level in, pack out. main() and the tests call the same functions.
+#pragma once
+
+#include <bake/progress.h>
+#include <pack/pack_data.h>
+#include <pipeline/profile.h>
+#include <scene/scene.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct CookOptions {
+    std::filesystem::path level, pack;
+    std::string profile = "desktop";
+    std::string quality = "preview";
+    uint32_t threads = 0;  // 0: as many as the machine has
+};
+
+struct CookStats {
+    std::map<std::string, double> seconds;  // per stage
+    uint64_t rays = 0;
+    uint32_t bounces = 0;
+    uint64_t peak_bytes = 0;  // of the whole process
+    std::vector<std::string> warnings;
+};
+
+// Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data.
+Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
+                             CookStats& stats);
+
+struct CookResult {
+    PackData pack;
+    uint64_t file_bytes = 0;
+    CookStats stats;
+};
+
+// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written.
+Expected<CookResult> cook(const CookOptions& options, Progress& progress);
+
+}  // namespace dimmer::cook

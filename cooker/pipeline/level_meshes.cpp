@@ -1,0 +1,77 @@
+#include <pipeline/level_meshes.h>
+
+#include <map>
+#include <tuple>
+
+namespace dimmer::cook {
+namespace {
+
+std::array<float, 3> array(glm::vec3 v) {
+    return {v.x, v.y, v.z};
+}
+
+// The one colour that a mesh is drawn with: the material's, times the mean of its texture.
+glm::vec3 meanReflectance(const Scene& scene, const Material& material) {
+    glm::vec3 color = material.base_color;
+    if (material.base_color_image) {
+        glm::vec4 sum(0);
+        const Image& image = scene.images[*material.base_color_image];
+        for (const glm::vec4& texel : image.texels) sum += texel;
+        if (!image.texels.empty()) color *= glm::vec3(sum) / static_cast<float>(image.texels.size());
+    }
+    return material.reflectance(color);
+}
+
+class MeshBuilder {
+   public:
+    Mesh mesh;
+
+    void add(const SceneMesh& from, uint32_t vertex, glm::vec2 uv, bool back) {
+        const auto key = std::tuple(vertex, uv.x, uv.y, back);
+        const auto [it, fresh] = index_.try_emplace(key, static_cast<uint32_t>(mesh.vertices.size()));
+        if (fresh) {
+            const glm::vec3 normal = back ? -from.normals[vertex] : from.normals[vertex];
+            mesh.vertices.push_back({array(from.positions_m[vertex]), array(normal), {uv.x, uv.y}});
+        }
+        mesh.indices.push_back(it->second);
+    }
+
+   private:
+    std::map<std::tuple<uint32_t, float, float, bool>, uint32_t> index_;
+};
+
+}  // namespace
+
+std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap) {
+    const Scene& scene = rays.scene();
+    const auto sets = static_cast<uint32_t>(scene.light_sets.size());
+    const glm::vec2 page_size(unwrap.page_width, unwrap.page_height);
+    std::map<std::tuple<uint32_t, uint32_t, uint32_t>, MeshBuilder> builders;  // scene mesh, material, page
+    for (uint32_t f = 0; f < unwrap.faces.size(); ++f) {
+        const Face face = unwrap.faces[f];
+        const LevelTriangle& t = rays.triangles()[face.triangle];
+        const SceneMesh& from = scene.meshes[t.mesh];
+        const uint32_t page = unwrap.charts[unwrap.face_chart[f]].page;
+        const auto [it, fresh] = builders.try_emplace({t.mesh, t.material, page});
+        if (fresh) {
+            const Material& material = scene.materials[t.material];
+            Mesh& mesh = it->second.mesh;
+            mesh.node = from.node;
+            mesh.page = page;
+            if (from.door) mesh.door = sets + *from.door;
+            mesh.reflectance = array(meanReflectance(scene, material));
+            mesh.emission_cd_m2 = array(material.emission_cd_m2);
+            if (material.emission_cd_m2 != glm::vec3(0)) mesh.emission_set = from.light_set;
+        }
+        for (int i = 0; i < 3; ++i) {
+            const int c = face.back ? (3 - i) % 3 : i;  // seen from its own front
+            it->second.add(from, from.triangles[t.triangle][c], unwrap.uv_texels[f][static_cast<size_t>(c)] / page_size,
+                           face.back);
+        }
+    }
+    std::vector<Mesh> meshes;
+    for (auto& [key, builder] : builders) meshes.push_back(std::move(builder.mesh));
+    return meshes;
+}
+
+}  // namespace dimmer::cook

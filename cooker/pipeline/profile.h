@@ -1,0 +1,42 @@
+// A profile: the budgets, densities and qualities of a target platform.
+#pragma once
+
+#include <dimmer/error.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct Quality {
+    uint32_t samples_per_texel = 4;  // points of a texel that rays start from
+    uint32_t series_rays = 32;       // per texel, for the bounces
+    uint32_t rays = 128;             // per texel, for what is stored
+    uint32_t emitter_samples = 8;    // per texel and light group
+    uint32_t bounces = 64;           // at most
+    float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
+};
+
+struct Profile {
+    // Bytes; 0: no limit.
+    uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_per_element = 0;
+    float texels_per_metre = 4;
+    uint32_t page_size = 2048;
+    float threshold = 0.01f;  // activity, see BakeSettings
+    Quality draft, preview, final;
+
+    // Where each setting's value comes from: "default", a profile's name, or its file.
+    std::map<std::string, std::string> origin;
+
+    const Quality* quality(const std::string& name) const;
+    // Every setting as JSON: {"lightmaps.texels_per_metre": {"value": 4, "from": "desktop"}, ...}.
+    std::string settingsJson(const std::string& quality) const;
+};
+
+// A shipped profile by name, or a file. Unknown keys, wrong types and values out of range are errors that name the key.
+Expected<Profile> loadProfile(const std::string& name_or_file);
+std::vector<std::string> shippedProfiles();
+
+}  // namespace dimmer::cook

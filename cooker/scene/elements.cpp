@@ -1,0 +1,157 @@
+#include <fmt/format.h>
+#include <scene/elements.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+
+Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras, const std::string& owner) {
+    const auto name = extras.text("dimmer_light_set");
+    if (!name) return std::unexpected(name.error());
+    const auto stated = extras.positive("dimmer_max_weight");
+    if (!stated) return std::unexpected(stated.error());
+    if (!*name) {
+        if (*stated) context_.warn(owner, "'dimmer_max_weight' without 'dimmer_light_set' was ignored.");
+        return std::nullopt;
+    }
+    const auto ok = checkElementName(context_, **name, "dimmer_light_set", extras.ownerOf("dimmer_light_set"));
+    if (!ok) return std::unexpected(ok.error());
+    const auto max_weight = static_cast<float>(stated->value_or(1.0));
+    auto& sets = context_.scene.light_sets;
+    const auto [set, is_new] = set_of_name_.try_emplace(**name, static_cast<uint32_t>(sets.size()));
+    if (is_new) sets.push_back({**name, max_weight});
+    sets[set->second].max_weight = std::max(sets[set->second].max_weight, max_weight);
+    return set->second;
+}
+
+Expected<std::optional<uint32_t>> Elements::door(const Extras& extras, const std::string& owner) {
+    const auto name = extras.text("dimmer_door");
+    if (!name) return std::unexpected(name.error());
+    if (!*name) return std::nullopt;
+    if (const auto ok = checkElementName(context_, **name, "dimmer_door", extras.ownerOf("dimmer_door")); !ok)
+        return std::unexpected(ok.error());
+    auto& doors = context_.scene.doors;
+    const auto [door, is_new] = door_of_name_.try_emplace(**name, static_cast<uint32_t>(doors.size()));
+    if (is_new) {
+        doors.emplace_back().name = **name;
+        doors_.emplace_back().owner = owner;
+    }
+    if (const auto ok = readOpening(extras, owner, door->second); !ok) return std::unexpected(ok.error());
+    if (const auto ok = readPose(extras, owner, door->second); !ok) return std::unexpected(ok.error());
+    return door->second;
+}
+
+Expected<void> Elements::readOpening(const Extras& extras, const std::string& owner, uint32_t index) {
+    const auto opening = extras.choice("dimmer_door_open", {"remove", "pose"});
+    if (!opening) return std::unexpected(opening.error());
+    if (!*opening) return {};
+    SceneDoor& door = context_.scene.doors[index];
+    const bool pose = **opening == 1;
+    std::string& stated_by = doors_[index].open_owner;
+    if (!stated_by.empty() && door.pose != pose)
+        return context_.error(
+            owner, fmt::format("its 'dimmer_door_open' differs from that of {}, which is the same door '{}'. "
+                               "Make them alike, or name two doors.",
+                               stated_by, door.name));
+    stated_by = owner;
+    door.pose = pose;
+    return {};
+}
+
+Expected<void> Elements::readPose(const Extras& extras, const std::string& owner, uint32_t index) {
+    const auto rotation = extras.numbers("dimmer_door_rotation", 4);
+    if (!rotation) return std::unexpected(rotation.error());
+    const auto translation = extras.numbers("dimmer_door_translation", 3);
+    if (!translation) return std::unexpected(translation.error());
+    if (!*rotation && !*translation) return {};
+
+    SceneDoor pose;
+    if (*rotation) {
+        const auto& q = **rotation;
+        const glm::dvec4 quaternion(q[0], q[1], q[2], q[3]);
+        const double length = glm::length(quaternion);
+        if (!(length > 1e-6))
+            return context_.error(owner,
+                                  "'dimmer_door_rotation' must be a quaternion x, y, z, w of length 1. Correct it.");
+        pose.open_rotation = quaternion / length;
+    }
+    if (*translation) pose.open_translation_m = glm::vec3((**translation)[0], (**translation)[1], (**translation)[2]);
+
+    SceneDoor& door = context_.scene.doors[index];
+    std::string& stated_by = doors_[index].pose_owner;
+    const bool differs = door.open_rotation != pose.open_rotation || door.open_translation_m != pose.open_translation_m;
+    if (!stated_by.empty() && differs)
+        return context_.error(owner,
+                              fmt::format("its open pose differs from that of {}, which is the same door '{}'. Make "
+                                          "them alike, or name two doors.",
+                                          stated_by, door.name));
+    stated_by = owner;
+    door.open_rotation = pose.open_rotation;
+    door.open_translation_m = pose.open_translation_m;
+    return {};
+}
+
+Expected<void> Elements::checkDoors() const {
+    for (size_t i = 0; i < doors_.size(); ++i) {
+        const std::string& name = context_.scene.doors[i].name;
+        if (!doors_[i].has_geometry)
+            return context_.error(doors_[i].owner,
+                                  fmt::format("the door '{}' has no geometry. Give it a mesh that is not "
+                                              "dynamic, or remove 'dimmer_door'.",
+                                              name));
+        if (!doors_[i].pose_owner.empty() && !context_.scene.doors[i].pose)
+            context_.warn(doors_[i].pose_owner,
+                          fmt::format("the open pose of door '{}' was ignored, as it opens by 'remove'; "
+                                      "set 'dimmer_door_open' to 'pose' to use it.",
+                                      name));
+    }
+    return {};
+}
+
+Expected<ElementRef> Elements::named(const std::string& name) const {
+    constexpr std::string_view door_prefix = "door:";
+    const bool is_door = name.starts_with(door_prefix);
+    const auto& known = is_door ? door_of_name_ : set_of_name_;
+    const auto found = known.find(is_door ? name.substr(door_prefix.size()) : name);
+    if (found != known.end()) return ElementRef{is_door, found->second};
+    return context_.error("'dimmer_combinations'",
+                          fmt::format("'{}' is no {} of this level. {}", name, is_door ? "door" : "light set",
+                                      !is_door && door_of_name_.contains(name)
+                                          ? fmt::format("There is a door of that name: write 'door:{}'.", name)
+                                          : "Correct the name or remove it."));
+}
+
+Expected<void> Elements::combination(const tinygltf::Value& list) {
+    std::vector<ElementRef> combination;
+    for (const tinygltf::Value& item : list.Get<tinygltf::Value::Array>()) {
+        const auto element = named(item.Get<std::string>());
+        if (!element) return std::unexpected(element.error());
+        const auto same = [&](ElementRef other) {
+            return other.is_door == element->is_door && other.index == element->index;
+        };
+        if (std::ranges::none_of(combination, same)) combination.push_back(*element);
+    }
+    if (std::ranges::count(combination, false, &ElementRef::is_door) > 1)
+        return context_.error("'dimmer_combinations'",
+                              "one combination names two light sets. The light of two sets simply "
+                              "adds up: name at most one set with the doors.");
+    context_.scene.combinations.push_back(std::move(combination));
+    return {};
+}
+
+Expected<void> Elements::combinations(const Extras& scene_extras) {
+    const tinygltf::Value* lists = scene_extras.raw("dimmer_combinations");
+    if (lists == nullptr) return {};
+    const auto is_list_of_texts = [](const tinygltf::Value& list) {
+        return list.IsArray() && std::ranges::all_of(list.Get<tinygltf::Value::Array>(),
+                                                     [](const tinygltf::Value& item) { return item.IsString(); });
+    };
+    const auto& all = lists->Get<tinygltf::Value::Array>();  // empty unless it is an array
+    if (!lists->IsArray() || !std::ranges::all_of(all, is_list_of_texts))
+        return context_.error("scene", "'dimmer_combinations' must be a list of lists of names. Correct it.");
+    for (const tinygltf::Value& list : all)
+        if (const auto ok = combination(list); !ok) return ok;
+    return {};
+}
+
+}  // namespace dimmer::cook

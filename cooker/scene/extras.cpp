@@ -1,0 +1,160 @@
+#include <fmt/format.h>
+#include <scene/extras.h>
+
+#include <algorithm>
+#include <array>
+#include <span>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr std::array<std::string_view, 12> node_keys = {
+    "dimmer_light_set",     "dimmer_max_weight",       "dimmer_bake",     "dimmer_door",    "dimmer_door_open",
+    "dimmer_door_rotation", "dimmer_door_translation", "dimmer_lighting", "dimmer_dynamic", "dimmer_texel_density",
+    "dimmer_grid_spacing",  "dimmer_play_area"};
+constexpr std::array<std::string_view, 4> scene_keys = {"dimmer_sky_color", "dimmer_sky_luminance", "dimmer_sky_image",
+                                                        "dimmer_combinations"};
+
+bool contains(std::span<const std::string_view> keys, std::string_view key) {
+    return std::ranges::count(keys, key) > 0;
+}
+
+// Levenshtein distance, one row at a time.
+size_t editDistance(std::string_view a, std::string_view b) {
+    std::vector<size_t> row(b.size() + 1);
+    for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
+    for (size_t i = 1; i <= a.size(); ++i) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= b.size(); ++j) {
+            const size_t replaced = diagonal + (a[i - 1] != b[j - 1]);
+            diagonal = row[j];
+            row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+        }
+    }
+    return row[b.size()];
+}
+
+std::string_view nearest(std::string_view key) {
+    key = key.substr(0, 64);  // longer than any key; bounds the work for absurd ones
+    std::string_view best = node_keys[0];
+    size_t best_distance = editDistance(key, best);
+    const auto consider = [&](std::string_view candidate) {
+        const size_t distance = editDistance(key, candidate);
+        if (distance < best_distance) best = candidate, best_distance = distance;
+    };
+    std::ranges::for_each(node_keys, consider);
+    std::ranges::for_each(scene_keys, consider);
+    return best;
+}
+
+bool isFiniteNumber(const tinygltf::Value& value) {
+    return value.IsNumber() && isFiniteFloat(value.GetNumberAsDouble());
+}
+
+}  // namespace
+
+void Extras::add(const tinygltf::Value& values, std::string owner) {
+    if (values.IsObject()) sources_.push_back({&values, std::move(owner)});
+}
+
+const Extras::Source* Extras::find(std::string_view key) const {
+    const std::string name(key);
+    const auto source = std::ranges::find_if(sources_, [&](const Source& s) { return s.values->Has(name); });
+    return source == sources_.end() ? nullptr : &*source;
+}
+
+const tinygltf::Value* Extras::raw(std::string_view key) const {
+    const Source* source = find(key);
+    return source == nullptr ? nullptr : &source->values->Get(std::string(key));
+}
+
+std::unexpected<Error> Extras::wrongType(std::string_view key, std::string_view wanted) const {
+    return context_->error(ownerOf(key), fmt::format("'{}' must be {}. Correct the custom property.", key, wanted));
+}
+
+Expected<std::optional<std::string>> Extras::text(std::string_view key) const {
+    const tinygltf::Value* value = raw(key);
+    if (value == nullptr) return std::nullopt;
+    if (!value->IsString()) return wrongType(key, "a text");
+    return value->Get<std::string>();
+}
+
+Expected<std::optional<double>> Extras::number(std::string_view key) const {
+    const tinygltf::Value* value = raw(key);
+    if (value == nullptr) return std::nullopt;
+    if (!isFiniteNumber(*value)) return wrongType(key, "a finite number");
+    return value->GetNumberAsDouble();
+}
+
+Expected<std::optional<double>> Extras::positive(std::string_view key) const {
+    const auto value = number(key);
+    if (value && *value && !(static_cast<float>(**value) > 0)) return wrongType(key, "a number greater than 0");
+    return value;
+}
+
+Expected<std::optional<std::vector<double>>> Extras::numbers(std::string_view key, size_t count) const {
+    const tinygltf::Value* value = raw(key);
+    if (value == nullptr) return std::nullopt;
+    const std::string wanted = fmt::format("a list of {} finite numbers", count);
+    if (!value->IsArray() || value->ArrayLen() != count) return wrongType(key, wanted);
+    std::vector<double> numbers;
+    for (const tinygltf::Value& item : value->Get<tinygltf::Value::Array>()) {
+        if (!isFiniteNumber(item)) return wrongType(key, wanted);
+        numbers.push_back(item.GetNumberAsDouble());
+    }
+    return numbers;
+}
+
+Expected<bool> Extras::flag(std::string_view key) const {
+    const tinygltf::Value* value = raw(key);
+    if (value == nullptr) return false;
+    if (value->IsBool()) return value->Get<bool>();
+    if (value->IsNumber() && (value->GetNumberAsDouble() == 0 || value->GetNumberAsDouble() == 1))
+        return value->GetNumberAsDouble() == 1;
+    return wrongType(key, "1 or 0, true or false");
+}
+
+Expected<std::optional<size_t>> Extras::choice(std::string_view key,
+                                               const std::vector<std::string_view>& choices) const {
+    const auto value = text(key);
+    if (!value) return std::unexpected(value.error());
+    if (!*value) return std::nullopt;
+    const auto found = std::ranges::find(choices, **value);
+    if (found == choices.end())
+        return wrongType(key, fmt::format("'{}', not '{}'", fmt::join(choices, "', '"), **value));
+    return static_cast<size_t>(found - choices.begin());
+}
+
+void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, ExtrasPlace place,
+                     const std::string& owner) {
+    const auto here = place == ExtrasPlace::Node ? std::span<const std::string_view>(node_keys) : scene_keys;
+    const auto elsewhere = place == ExtrasPlace::Node ? std::span<const std::string_view>(scene_keys) : node_keys;
+    for (const std::string& key : extras.Keys()) {
+        if (!key.starts_with("dimmer_") || contains(here, key)) continue;
+        if (contains(elsewhere, key))
+            context.warn(owner, fmt::format("'{}' has no meaning here and was ignored; it belongs in the extras of {}.",
+                                            key, place == ExtrasPlace::Node ? "the scene" : "a node"));
+        else
+            context.warn(owner,
+                         fmt::format("'{}' is not a known key and was ignored; did you mean '{}'?", key, nearest(key)));
+    }
+}
+
+Expected<void> checkElementName(const ImportContext& context, const std::string& name, std::string_view key,
+                                const std::string& owner) {
+    const bool writable = !name.empty() && name.find_first_of(",=") == std::string::npos &&
+                          std::ranges::none_of(name, [](unsigned char c) { return c < 0x20; });
+    if (!writable)
+        return context.error(owner,
+                             fmt::format("'{}' is '{}', but a name needs a character, and none of ',', '=' and line "
+                                         "breaks. Rename it.",
+                                         key, name));
+    if (key == "dimmer_light_set" && (name == "all" || name.starts_with("door:")))
+        return context.error(owner, fmt::format("the light set's name '{}' has a meaning of its own where states are "
+                                                "written. Rename it.",
+                                                name));
+    return {};
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,182 @@
+#include <fmt/format.h>
+#include <scene/gltf_file.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <span>
+
+namespace dimmer::cook {
+namespace {
+
+using Bytes = std::vector<unsigned char>;
+
+// The parser recurses into nested extras; this keeps a hostile file from exhausting the stack. Real files nest ~10.
+constexpr size_t nesting_max = 100;
+// The parser counts bytes in 32 bits, images in 31.
+constexpr uintmax_t file_bytes_max = std::numeric_limits<int32_t>::max();
+
+Expected<Bytes> readFile(const std::filesystem::path& path) {
+    std::error_code problem;
+    if (!std::filesystem::is_regular_file(path, problem))
+        return fail(ErrorCode::Io, fmt::format("{}: there is no such file. Check the path.", path.string()));
+    const uintmax_t size = std::filesystem::file_size(path, problem);
+    if (problem) return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
+    if (size > file_bytes_max)
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: is larger than 2 GiB. Split the level into several files.", path.string()));
+    Bytes bytes(static_cast<size_t>(size));
+    std::ifstream stream(path, std::ios::binary);
+    stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!stream) return fail(ErrorCode::Io, fmt::format("{}: cannot be read. Check its permissions.", path.string()));
+    return bytes;
+}
+
+uint32_t littleEndian32(std::span<const unsigned char> bytes, size_t offset) {
+    return uint32_t{bytes[offset]} | uint32_t{bytes[offset + 1]} << 8 | uint32_t{bytes[offset + 2]} << 16 |
+           uint32_t{bytes[offset + 3]} << 24;
+}
+
+bool isGlb(std::span<const unsigned char> bytes) {
+    return bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
+}
+
+// The GLB container (glTF 2.0 specification, "GLB File Format"): a 12-byte header, then chunks of 8 + length bytes.
+// Returns the JSON chunk. tinygltf's own check lets a last chunk reach 8 bytes past the end.
+Expected<std::string_view> glbJson(std::span<const unsigned char> bytes, const std::string& file) {
+    constexpr size_t header_bytes = 12, chunk_header_bytes = 8;
+    constexpr uint32_t json_chunk = 0x4E4F534A;
+    const auto truncated = [&](std::string_view what) {
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: the GLB file is truncated: {}. Export or copy it again.", file, what));
+    };
+    if (bytes.size() < header_bytes + chunk_header_bytes) return truncated("it ends inside its header");
+    if (const uint32_t version = littleEndian32(bytes, 4); version != 2)
+        return fail(ErrorCode::BadInput, fmt::format("{}: is GLB version {}. Export it as glTF 2.0.", file, version));
+    const size_t length = littleEndian32(bytes, 8);
+    if (length > bytes.size())
+        return truncated(fmt::format("its header says {} bytes, the file has {}", length, bytes.size()));
+    for (size_t offset = header_bytes; offset < length;) {
+        if (length - offset < chunk_header_bytes) return truncated("it ends inside a chunk's header");
+        const size_t chunk_bytes = littleEndian32(bytes, offset);
+        if (chunk_bytes > length - offset - chunk_header_bytes)
+            return truncated(fmt::format("the chunk at byte {} reaches past its end", offset));
+        offset += chunk_header_bytes + chunk_bytes;
+    }
+    if (littleEndian32(bytes, header_bytes + 4) != json_chunk)
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: the GLB file does not start with JSON. Export it again.", file));
+    return std::string_view(reinterpret_cast<const char*>(bytes.data()) + header_bytes + chunk_header_bytes,
+                            littleEndian32(bytes, header_bytes));
+}
+
+size_t deepestNesting(std::string_view json) {
+    size_t depth = 0, deepest = 0;
+    bool in_string = false;
+    for (size_t i = 0; i < json.size(); ++i) {
+        const char c = json[i];
+        if (in_string) {
+            if (c == '\\') ++i;
+            if (c == '"') in_string = false;
+        } else if (c == '"') {
+            in_string = true;
+        } else if (c == '{' || c == '[') {
+            deepest = std::max(deepest, ++depth);
+        } else if ((c == '}' || c == ']') && depth > 0) {
+            --depth;
+        }
+    }
+    return deepest;
+}
+
+// tinygltf looks for external files next to the level and then in the working directory. Only the first is meant:
+// a level must not depend on where the cooker was started.
+bool isBesideLevel(const std::string& path, void* level_folder) {
+    return path.starts_with(*static_cast<const std::string*>(level_folder) + "/");
+}
+
+std::string keepPath(const std::string& path, void*) {
+    return path;
+}
+
+bool readExternal(Bytes* out, std::string* message, const std::string& path, void*) {
+    Expected<Bytes> bytes = readFile(path);
+    if (bytes)
+        *out = std::move(*bytes);
+    else if (message)
+        *message = bytes.error().message;
+    return bytes.has_value();
+}
+
+// Decoding waits until it is known which images are used, and is done with checks of our own. An image in a buffer
+// view is left there: the view has not been validated yet, so its bytes must not be touched.
+bool keepEncoded(tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* bytes,
+                 int size, void*) {
+    image->as_is = true;
+    if (image->bufferView < 0 && size > 0) image->image.assign(bytes, bytes + size);
+    return true;
+}
+
+// The parser's messages may hold a whole data URI and line breaks.
+std::string oneLine(std::string text) {
+    constexpr size_t length_max = 300;
+    if (text.size() > length_max) text = text.substr(0, length_max) + "...";
+    std::ranges::replace(text, '\n', ' ');
+    while (text.ends_with(' ') || text.ends_with('.')) text.pop_back();
+    return text;
+}
+
+Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, const std::string& folder, const std::string& file) {
+    tinygltf::TinyGLTF parser;
+    parser.SetImageLoader(keepEncoded, nullptr);
+    std::string level_folder = folder;
+    parser.SetFsCallbacks({isBesideLevel, keepPath, readExternal, nullptr, &level_folder});
+    tinygltf::Model model;
+    std::string message, ignored;
+    const auto size = static_cast<unsigned>(bytes.size());
+    const bool parsed = glb ? parser.LoadBinaryFromMemory(&model, &message, &ignored, bytes.data(), size, folder)
+                            : parser.LoadASCIIFromString(&model, &message, &ignored,
+                                                         reinterpret_cast<const char*>(bytes.data()), size, folder);
+    // Some errors are reported by message alone, with the offending part left out.
+    if (parsed && message.empty()) return model;
+    return fail(ErrorCode::BadInput, fmt::format("{}: is not a usable glTF file: {}. Export it again, or have a glTF "
+                                                 "validator point out the place.",
+                                                 file, message.empty() ? "unknown reason" : oneLine(message)));
+}
+
+}  // namespace
+
+Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
+    const std::string file = path.string();
+    const Expected<Bytes> bytes = readFile(path);
+    if (!bytes) return std::unexpected(bytes.error());
+    if (bytes->empty()) return fail(ErrorCode::BadInput, fmt::format("{}: is empty. Export the level again.", file));
+
+    const bool glb = isGlb(*bytes);
+    std::string_view json(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    if (glb) {
+        const Expected<std::string_view> chunk = glbJson(*bytes, file);
+        if (!chunk) return std::unexpected(chunk.error());
+        json = *chunk;
+    }
+    if (deepestNesting(json) > nesting_max)
+        return fail(ErrorCode::BadInput, fmt::format("{}: its JSON nests more than {} levels deep. Remove such custom "
+                                                     "properties.",
+                                                     file, nesting_max));
+    const std::string folder = std::filesystem::absolute(path).parent_path().string();
+    try {
+        Expected<tinygltf::Model> model = parse(*bytes, glb, folder, file);
+        if (model && !model->asset.version.starts_with("2"))
+            return fail(ErrorCode::BadInput,
+                        fmt::format("{}: is glTF {}. Export it as glTF 2.0.", file, oneLine(model->asset.version)));
+        return model;
+    } catch (const std::bad_alloc&) {
+        throw;                                 // importLevel says what that means
+    } catch (const std::exception& problem) {  // the parser's JSON library throws on some malformed values
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: is not a usable glTF file: {}. Export it again.", file, oneLine(problem.what())));
+    }
+}
+
+}  // namespace dimmer::cook

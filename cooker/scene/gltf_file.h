@@ -1,0 +1,15 @@
+// From bytes to a parsed glTF document. Nothing in the result can be trusted yet but its types: see gltf_check.h.
+#pragma once
+
+#include <dimmer/error.h>
+#include <tiny_gltf.h>
+
+#include <filesystem>
+
+namespace dimmer::cook {
+
+// Reads .glb or .gltf (told apart by content) with its buffers. Images stay encoded: bytes of external and data-URI
+// images in tinygltf::Image::image (empty when unreadable), others in their buffer view.
+Expected<tinygltf::Model> readGltf(const std::filesystem::path& path);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,102 @@
+#include <fmt/format.h>
+#include <scene/image.h>
+#include <stb/stb_image.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+
+namespace dimmer::cook {
+namespace {
+
+// 8192 x 8192: 1 GiB as linear floats, and what GPUs handle everywhere.
+constexpr uint64_t texels_max = uint64_t{1} << 26;
+
+// IEC 61966-2-1.
+float linearFromSrgb(float encoded) {
+    return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
+}
+
+std::array<float, 256> decodeTable(TransferFunction transfer) {
+    std::array<float, 256> table{};
+    for (size_t i = 0; i < table.size(); ++i) {
+        const float encoded = static_cast<float>(i) / 255.0f;
+        table[i] = transfer == TransferFunction::Srgb ? linearFromSrgb(encoded) : encoded;
+    }
+    return table;
+}
+
+// The encoded bytes; the buffer view's range was checked by checkModel.
+std::span<const unsigned char> encodedBytes(const tinygltf::Model& model, const tinygltf::Image& image) {
+    if (image.bufferView < 0) return image.image;
+    const tinygltf::BufferView& view = model.bufferViews[static_cast<size_t>(image.bufferView)];
+    return std::span(model.buffers[static_cast<size_t>(view.buffer)].data).subspan(view.byteOffset, view.byteLength);
+}
+
+bool isPngOrJpeg(std::span<const unsigned char> bytes) {
+    const bool png = bytes.size() > 8 && bytes[0] == 0x89 && bytes[1] == 'P' && bytes[2] == 'N' && bytes[3] == 'G';
+    return png || (bytes.size() > 3 && bytes[0] == 0xFF && bytes[1] == 0xD8 && bytes[2] == 0xFF);
+}
+
+// Texel coordinates wrapped into 0..size-1.
+uint32_t wrap(float coordinate, uint32_t size) {
+    const float wrapped = coordinate - std::floor(coordinate / static_cast<float>(size)) * static_cast<float>(size);
+    return std::min(static_cast<uint32_t>(std::max(wrapped, 0.0f)), size - 1);
+}
+
+}  // namespace
+
+glm::vec4 Image::sample(glm::vec2 uv) const {
+    if (texels.empty()) return glm::vec4(1);
+    if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
+    uv -= glm::floor(uv);  // first, so that large coordinates keep their fraction's precision
+    const float x = uv.x * static_cast<float>(width) - 0.5f, y = uv.y * static_cast<float>(height) - 0.5f;
+    const float x0 = std::floor(x), y0 = std::floor(y);
+    const uint32_t left = wrap(x0, width), right = wrap(x0 + 1, width);
+    const uint32_t top = wrap(y0, height), bottom = wrap(y0 + 1, height);
+    const auto texel = [&](uint32_t column, uint32_t row) { return texels[size_t{row} * width + column]; };
+    return glm::mix(glm::mix(texel(left, top), texel(right, top), x - x0),
+                    glm::mix(texel(left, bottom), texel(right, bottom), x - x0), y - y0);
+}
+
+Expected<Image> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
+                            const std::string& owner) {
+    const tinygltf::Image& source = context.model.images[static_cast<size_t>(index)];
+    const std::string label = context.imageLabel(index) + (source.uri.empty() ? "" : " (" + source.uri + ")");
+    const std::span<const unsigned char> bytes = encodedBytes(context.model, source);
+    if (bytes.empty())
+        return context.error(owner,
+                             label + " cannot be read. Put it beside the level, or export the level with its images.");
+    if (!isPngOrJpeg(bytes))
+        return context.error(owner, label + " is neither PNG nor JPEG. Convert it and export the level again.");
+
+    const auto size = static_cast<int>(std::min<size_t>(bytes.size(), std::numeric_limits<int>::max()));
+    int width = 0, height = 0, channels = 0;
+    const bool known = stbi_info_from_memory(bytes.data(), size, &width, &height, &channels) != 0;
+    if (known && static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > texels_max)
+        return context.error(
+            owner, fmt::format("{} has {} x {} texels. Scale it to 8192 x 8192 or less.", label, width, height));
+    const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
+        known ? stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, 4) : nullptr, stbi_image_free);
+    if (!pixels || width < 1 || height < 1)
+        return context.error(owner, label + " is damaged. Save it again and export the level again.");
+
+    Image image{static_cast<uint32_t>(width), static_cast<uint32_t>(height), {}};
+    image.texels.resize(size_t{image.width} * image.height);
+    const std::array<float, 256> decode = decodeTable(transfer);
+    for (size_t i = 0; i < image.texels.size(); ++i) {
+        const stbi_uc* rgba = pixels.get() + i * 4;
+        image.texels[i] = {decode[rgba[0]], decode[rgba[1]], decode[rgba[2]], static_cast<float>(rgba[3]) / 255.0f};
+    }
+    return image;
+}
+
+glm::vec4 meanTexel(const Image& image) {
+    glm::dvec4 sum(0);
+    for (const glm::vec4& texel : image.texels) sum += glm::dvec4(texel);
+    return glm::vec4(sum / static_cast<double>(std::max<size_t>(image.texels.size(), 1)));
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,352 @@
+// importLevel: from the file to the scene, node by node.
+#include <fmt/format.h>
+#include <scene/elements.h>
+#include <scene/extras.h>
+#include <scene/gltf_check.h>
+#include <scene/gltf_file.h>
+#include <scene/light.h>
+#include <scene/material.h>
+#include <scene/mesh.h>
+#include <scene/node_walk.h>
+
+#include <algorithm>
+#include <new>
+#include <stdexcept>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr std::string_view player_start = "player_start";
+
+class LevelImporter {
+   public:
+    LevelImporter(const tinygltf::Model& model, std::string file) : model_(model) { scene_.file = std::move(file); }
+
+    Expected<Scene> run() {
+        for (const auto step :
+             {&LevelImporter::prepare, &LevelImporter::nodes, &LevelImporter::sky, &LevelImporter::conclude})
+            if (const auto ok = (this->*step)(); !ok) return std::unexpected(ok.error());
+        return std::move(scene_);
+    }
+
+   private:
+    Expected<void> prepare() {
+        if (const auto ok = checkModel(context_); !ok) return ok;
+        auto mappings = importMaterials(context_);
+        if (!mappings) return std::unexpected(mappings.error());
+        meshes_.emplace(context_, std::move(*mappings));
+        warnKeys();
+        return {};
+    }
+
+    const tinygltf::Value& sceneExtras() const {
+        return model_.scenes[static_cast<size_t>(std::max(model_.defaultScene, 0))].extras;
+    }
+
+    void warnKeys() {
+        const auto warnAll = [&](const auto& all, std::string (ImportContext::*label)(int) const) {
+            for (int i = 0; const auto& item : all) {
+                warnUnknownKeys(context_, item.extras, ExtrasPlace::Node, (context_.*label)(i));
+                ++i;
+            }
+        };
+        warnAll(model_.nodes, &ImportContext::nodeLabel);
+        warnAll(model_.meshes, &ImportContext::meshLabel);
+        warnAll(model_.lights, &ImportContext::lightLabel);
+        warnAll(model_.materials, &ImportContext::materialLabel);
+        warnUnknownKeys(context_, sceneExtras(), ExtrasPlace::Scene, "scene");
+    }
+
+    Expected<void> nodes() {
+        const auto placed = placeNodes(context_);
+        if (!placed) return std::unexpected(placed.error());
+        door_of_node_.resize(model_.nodes.size());
+        for (const PlacedNode& at : *placed)
+            if (const auto ok = node(at); !ok) return ok;
+        return {};
+    }
+
+    Expected<void> node(const PlacedNode& at) {
+        const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
+        const std::string owner = context_.nodeLabel(at.node);
+        const std::optional<int> light = lightOf(node);
+        const bool has_content = node.mesh >= 0 || light || node.camera >= 0 || node.name == player_start;
+        if (has_content && at.singular != -1) return singular(at, owner);
+
+        const Extras extras = extrasOf(at, light);
+        if (const auto ok = door(at, extras, owner); !ok) return ok;
+        const auto play_area = extras.flag("dimmer_play_area");
+        if (!play_area) return std::unexpected(play_area.error());
+        if (*play_area && at.singular != -1) return singular(at, owner);
+
+        if (node.mesh >= 0 && !*play_area)
+            if (const auto ok = mesh(at, extras, owner); !ok) return ok;
+        if (light)
+            if (const auto ok = this->light(at, *light, extras, owner); !ok) return ok;
+        if (node.mesh < 0 && !light)
+            if (const auto ok = withoutMeshOrLight(at, extras, owner); !ok) return ok;
+        if (node.camera >= 0 || node.name == player_start) return viewpoint(at);
+        return {};
+    }
+
+    std::unexpected<Error> singular(const PlacedNode& at, const std::string& owner) const {
+        const std::string whose = at.singular == at.node
+                                      ? "its transform"
+                                      : "the transform of " + context_.nodeLabel(at.singular) + " above it";
+        return context_.error(owner, whose + " is singular: it flattens space. Give every axis a scale other than 0.");
+    }
+
+    // Blender's exporter hangs lights below a node "<object>_Orientation" of its own, while the custom properties stay
+    // with the object.
+    bool isOrientationOf(int node, int parent) const {
+        return parent >= 0 && model_.nodes[static_cast<size_t>(node)].name ==
+                                  model_.nodes[static_cast<size_t>(parent)].name + "_Orientation";
+    }
+
+    Extras extrasOf(const PlacedNode& at, std::optional<int> light) const {
+        const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
+        Extras extras(context_);
+        extras.add(node.extras, context_.nodeLabel(at.node));
+        if (light && isOrientationOf(at.node, at.parent))
+            extras.add(model_.nodes[static_cast<size_t>(at.parent)].extras, context_.nodeLabel(at.parent));
+        if (node.mesh >= 0)
+            extras.add(model_.meshes[static_cast<size_t>(node.mesh)].extras, context_.meshLabel(node.mesh));
+        if (light) extras.add(model_.lights[static_cast<size_t>(*light)].extras, context_.lightLabel(*light));
+        if (node.mesh >= 0)
+            for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<size_t>(node.mesh)].primitives)
+                if (primitive.material >= 0)
+                    extras.add(model_.materials[static_cast<size_t>(primitive.material)].extras,
+                               context_.materialLabel(primitive.material));
+        return extras;
+    }
+
+    // A node belongs to the nearest door at or above it.
+    Expected<void> door(const PlacedNode& at, const Extras& extras, const std::string& owner) {
+        const auto own = elements_.door(extras, owner);
+        if (!own) return std::unexpected(own.error());
+        auto& door = door_of_node_[static_cast<size_t>(at.node)];
+        door = *own;
+        if (!door && at.parent >= 0) door = door_of_node_[static_cast<size_t>(at.parent)];
+        return {};
+    }
+
+    Expected<Lighting> lighting(const Extras& extras, const std::string& owner) const {
+        const auto stated = extras.choice("dimmer_lighting", {"lightmap", "local_grid", "dynamic", "none"});
+        if (!stated) return std::unexpected(stated.error());
+        const auto dynamic = extras.flag("dimmer_dynamic");
+        if (!dynamic) return std::unexpected(dynamic.error());
+        constexpr Lighting of_choice[] = {Lighting::Lightmap, Lighting::LocalGrid, Lighting::Dynamic, Lighting::None};
+        const Lighting lighting = *stated ? of_choice[**stated] : Lighting::Automatic;
+        if (!*dynamic) return lighting;
+        if (*stated && lighting != Lighting::Dynamic)
+            return context_.error(owner, "'dimmer_dynamic' contradicts its 'dimmer_lighting'. Remove one of them.");
+        return Lighting::Dynamic;
+    }
+
+    struct MeshSettings {
+        Lighting lighting = Lighting::Automatic;
+        std::optional<float> texels_per_metre, grid_spacing_m;
+    };
+
+    Expected<MeshSettings> meshSettings(const Extras& extras, const std::string& owner) const {
+        const auto lighting = this->lighting(extras, owner);
+        if (!lighting) return std::unexpected(lighting.error());
+        const auto density = extras.positive("dimmer_texel_density");
+        if (!density) return std::unexpected(density.error());
+        const auto spacing = extras.positive("dimmer_grid_spacing");
+        if (!spacing) return std::unexpected(spacing.error());
+        const auto narrow = [](std::optional<double> value) {
+            return value ? std::optional(static_cast<float>(*value)) : std::nullopt;
+        };
+        return MeshSettings{*lighting, narrow(*density), narrow(*spacing)};
+    }
+
+    // Primitives whose emission one light set dims, or none. Named by the node or mesh, a set has them all; by a
+    // material, those of that material.
+    struct EmissionGroup {
+        std::optional<uint32_t> light_set;
+        std::vector<size_t> primitives;
+    };
+
+    Expected<std::vector<EmissionGroup>> emissionGroups(const PlacedNode& at, const std::string& owner) {
+        const int mesh_index = model_.nodes[static_cast<size_t>(at.node)].mesh;
+        const tinygltf::Mesh& mesh = model_.meshes[static_cast<size_t>(mesh_index)];
+        Extras shared(context_);
+        shared.add(model_.nodes[static_cast<size_t>(at.node)].extras, owner);
+        shared.add(mesh.extras, context_.meshLabel(mesh_index));
+        const auto shared_set = elements_.lightSet(shared, owner);
+        if (!shared_set) return std::unexpected(shared_set.error());
+
+        std::vector<EmissionGroup> groups;
+        for (size_t i = 0; i < mesh.primitives.size(); ++i) {
+            std::optional<uint32_t> set = *shared_set;
+            if (const int material = mesh.primitives[i].material; !set && material >= 0) {
+                Extras of_material(context_);
+                of_material.add(model_.materials[static_cast<size_t>(material)].extras,
+                                context_.materialLabel(material));
+                const auto own = elements_.lightSet(of_material, context_.materialLabel(material));
+                if (!own) return std::unexpected(own.error());
+                set = *own;
+            }
+            auto group = std::ranges::find(groups, set, &EmissionGroup::light_set);
+            if (group == groups.end()) group = groups.insert(groups.end(), EmissionGroup{set, {}});
+            group->primitives.push_back(i);
+        }
+        return groups;
+    }
+
+    bool isEmissiveMesh(const SceneMesh& mesh) const {
+        return std::ranges::any_of(mesh.triangle_materials,
+                                   [&](uint32_t material) { return isEmissive(scene_.materials[material]); });
+    }
+
+    Expected<void> mesh(const PlacedNode& at, const Extras& extras, const std::string& owner) {
+        const auto settings = meshSettings(extras, owner);
+        if (!settings) return std::unexpected(settings.error());
+        const auto groups = emissionGroups(at, owner);
+        if (!groups) return std::unexpected(groups.error());
+        bool any = false;
+        for (const EmissionGroup& group : *groups) {
+            Expected<SceneMesh> mesh = meshes_->import(at.node, group.primitives, at.world_from_node);
+            if (!mesh) return std::unexpected(mesh.error());
+            if (group.light_set && !isEmissiveMesh(*mesh) && !lightOf(model_.nodes[static_cast<size_t>(at.node)]))
+                return withoutLight(extras, owner);
+            if (mesh->triangles.empty()) continue;
+            any = true;
+            place(at, *settings, group.light_set, std::move(*mesh));
+        }
+        if (!any) context_.warn(owner, "its mesh has no triangles and was ignored.");
+        return {};
+    }
+
+    void place(const PlacedNode& at, const MeshSettings& settings, std::optional<uint32_t> light_set, SceneMesh mesh) {
+        mesh.node = nodeName(at.node);
+        mesh.lighting = settings.lighting;
+        mesh.texels_per_metre = settings.texels_per_metre;
+        mesh.grid_spacing_m = settings.grid_spacing_m;
+        if (isEmissiveMesh(mesh)) mesh.light_set = light_set;
+        mesh.door = door_of_node_[static_cast<size_t>(at.node)];
+        if (mesh.door && mesh.lighting != Lighting::Dynamic) elements_.doorHasGeometry(*mesh.door);
+        scene_.meshes.push_back(std::move(mesh));
+    }
+
+    std::string nodeName(int index) const {
+        const std::string& name = model_.nodes[static_cast<size_t>(index)].name;
+        return name.empty() ? fmt::format("node_{}", index) : name;
+    }
+
+    std::unexpected<Error> withoutLight(const Extras& extras, const std::string& owner) const {
+        const std::string& stated_by = extras.ownerOf("dimmer_light_set");
+        return context_.error(owner,
+                              fmt::format("is in the light set '{}'{}, but has neither a light nor an emissive mesh. "
+                                          "Remove 'dimmer_light_set', or give its material emission.",
+                                          extras.raw("dimmer_light_set")->Get<std::string>(),
+                                          stated_by == owner ? "" : fmt::format(" (by {})", stated_by)));
+    }
+
+    Expected<void> light(const PlacedNode& at, int light_index, const Extras& extras, const std::string& owner) {
+        Expected<PunctualLight> light = importLight(context_, light_index, at.node, at.world_from_node);
+        if (!light) return std::unexpected(light.error());
+        light->node = nodeName(at.node);
+        const auto bake = extras.choice("dimmer_bake", {"indirect", "full", "none"});
+        if (!bake) return std::unexpected(bake.error());
+        constexpr BakeMode of_choice[] = {BakeMode::Indirect, BakeMode::Full, BakeMode::None};
+        if (*bake) light->bake = of_choice[**bake];
+        const auto set = elements_.lightSet(extras, owner);
+        if (!set) return std::unexpected(set.error());
+        light->light_set = *set;
+        const tinygltf::Light& source = model_.lights[static_cast<size_t>(light_index)];
+        if (source.extensions.contains("EXT_lights_ies") ||
+            model_.nodes[static_cast<size_t>(at.node)].extensions.contains("EXT_lights_ies"))
+            context_.warn(owner, "its EXT_lights_ies profile is not supported yet and was ignored.");
+        scene_.lights.push_back(std::move(*light));
+        return {};
+    }
+
+    Expected<void> withoutMeshOrLight(const PlacedNode& at, const Extras& extras, const std::string& owner) {
+        const auto& children = model_.nodes[static_cast<size_t>(at.node)].children;
+        const bool carries_light = std::ranges::any_of(children, [&](int child) {
+            return isOrientationOf(child, at.node) && lightOf(model_.nodes[static_cast<size_t>(child)]);
+        });
+        const auto set = extras.text("dimmer_light_set");
+        if (!set) return std::unexpected(set.error());
+        if (*set && !carries_light) return withoutLight(extras, owner);
+        const auto dynamic = lighting(extras, owner);
+        if (!dynamic) return std::unexpected(dynamic.error());
+        if (*dynamic != Lighting::Dynamic) return {};
+        const glm::dvec3 place = at.world_from_node[3];
+        scene_.dynamic_places_m.emplace_back(place);
+        return {};
+    }
+
+    Expected<void> viewpoint(const PlacedNode& at) {
+        const int camera = model_.nodes[static_cast<size_t>(at.node)].camera;
+        Expected<SceneViewpoint> view =
+            importViewpoint(context_, camera < 0 ? std::nullopt : std::optional(camera), at.node, at.world_from_node);
+        if (!view) return std::unexpected(view.error());
+        if (view->name.empty()) view->name = nodeName(at.node);
+        auto& views = scene_.viewpoints;
+        views.insert(view->name == player_start ? views.begin() : views.end(), std::move(*view));
+        return {};
+    }
+
+    Expected<void> sky() {
+        Extras extras(context_);
+        extras.add(sceneExtras(), "scene");
+        const auto color = extras.numbers("dimmer_sky_color", 3);
+        if (!color) return std::unexpected(color.error());
+        const auto luminance = extras.number("dimmer_sky_luminance");
+        if (!luminance) return std::unexpected(luminance.error());
+        if (extras.has("dimmer_sky_image"))
+            context_.warn("scene", "'dimmer_sky_image' is not supported yet and was ignored.");
+        if (color->has_value() != luminance->has_value()) {
+            context_.warn("scene", "the sky needs both 'dimmer_sky_color' and 'dimmer_sky_luminance'; it stays black.");
+            return {};
+        }
+        if (!*color) return {};
+        const glm::dvec3 c((**color)[0], (**color)[1], (**color)[2]);
+        const glm::dvec3 radiance = c * **luminance;
+        if (!isFinite(radiance) || **luminance < 0 || glm::any(glm::lessThan(c, glm::dvec3(0))))
+            return context_.error("scene",
+                                  "'dimmer_sky_color' times 'dimmer_sky_luminance' is negative or infinite. Correct "
+                                  "them.");
+        scene_.sky_radiance_cd_m2 = radiance;
+        return {};
+    }
+
+    Expected<void> conclude() {
+        if (const auto ok = elements_.checkDoors(); !ok) return ok;
+        Extras extras(context_);
+        extras.add(sceneExtras(), "scene");
+        if (const auto ok = elements_.combinations(extras); !ok) return ok;
+        if (scene_.meshes.empty())
+            return context_.error("scene",
+                                  "holds no triangles, so there is nothing to light. Export the level's meshes.");
+        return {};
+    }
+
+    const tinygltf::Model& model_;
+    Scene scene_;
+    ImportContext context_{model_, scene_};
+    Elements elements_{context_};
+    std::optional<MeshImporter> meshes_;
+    std::vector<std::optional<uint32_t>> door_of_node_;
+};
+
+}  // namespace
+
+Expected<Scene> importLevel(const std::filesystem::path& path) {
+    try {
+        const Expected<tinygltf::Model> model = readGltf(path);
+        if (!model) return std::unexpected(model.error());
+        return LevelImporter(*model, path.string()).run();
+    } catch (const std::bad_alloc&) {
+        return fail(ErrorCode::OutOfMemory, path.string() + ": needs more memory than there is. Split the level.");
+    } catch (const std::length_error&) {
+        return fail(ErrorCode::OutOfMemory, path.string() + ": needs more memory than there is. Split the level.");
+    } catch (const std::filesystem::filesystem_error& problem) {
+        return fail(ErrorCode::Io, problem.what());
+    }
+}
+
+}  // namespace dimmer::cook

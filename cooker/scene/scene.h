@@ -1,0 +1,125 @@
+// A level in memory, as the cooker needs it: world space, metres, +Y up, linear Rec.709, photometric units.
+#pragma once
+
+#include <dimmer/error.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <glm/glm.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+enum class AlphaMode { Opaque, Mask, Blend };
+
+struct Image {
+    uint32_t width = 0, height = 0;
+    std::vector<glm::vec4> texels;  // linear colour, alpha; rows from the top
+    // Bilinear, repeating.
+    glm::vec4 sample(glm::vec2 uv) const;
+};
+
+struct Material {
+    std::string name;
+    glm::vec3 base_color{1};
+    float metallic = 0;
+    float specular = 1;  // KHR_materials_specular's specularFactor
+    glm::vec3 emission_cd_m2{0};
+    float alpha = 1;
+    AlphaMode alpha_mode = AlphaMode::Opaque;
+    float alpha_cutoff = 0.5f;
+    bool double_sided = false;
+    std::optional<uint32_t> base_color_image;  // index into Scene::images, multiplies base_color and alpha
+
+    // Total Lambert reflectance for a given base colour, clamped to [0, 0.99].
+    glm::vec3 reflectance(glm::vec3 color) const;
+};
+
+// How a mesh receives light.
+enum class Lighting {
+    Automatic,  // lightmap when its charts are large and few, else local grid
+    Lightmap,
+    LocalGrid,
+    Dynamic,  // moves: receives light, does not affect it
+    None,     // receives nothing; blocks light and reflects none
+};
+
+// All primitives of one glTF node, in world space. A mirrored transform has its winding mended.
+struct SceneMesh {
+    std::string node;
+    std::vector<glm::vec3> positions_m;
+    std::vector<glm::vec3> normals;            // unit; one per position
+    std::vector<glm::vec2> uv0;                // for textures; empty when the file has none
+    std::vector<glm::vec2> uv1;                // the file's lightmap UVs; empty when it has none
+    std::vector<glm::uvec3> triangles;         // counter-clockwise seen from the front; no degenerate ones
+    std::vector<uint32_t> triangle_materials;  // index into Scene::materials
+    std::vector<uint32_t> triangle_regions;    // empty, or per triangle: different regions never share a chart
+    Lighting lighting = Lighting::Automatic;
+    std::optional<uint32_t> light_set;  // its emissive materials belong to that set
+    std::optional<uint32_t> door;
+    std::optional<float> texels_per_metre;
+    std::optional<float> grid_spacing_m;
+};
+
+enum class LightType { Point, Spot, Directional };
+enum class BakeMode { Indirect, Full, None };
+
+struct PunctualLight {
+    std::string node;
+    LightType type = LightType::Point;
+    glm::vec3 position_m{0};
+    glm::vec3 direction{0, 0, -1};  // the way the light travels, unit
+    glm::vec3 intensity{0};         // candela (point, spot) or lux on a facing surface (directional)
+    std::optional<float> range_m;   // windows with clamp(1 - (d / range)^4, 0, 1)
+    float cone_inner_cos = 1, cone_outer_cos = 0.70710678f;
+    BakeMode bake = BakeMode::Indirect;
+    std::optional<uint32_t> light_set;
+};
+
+struct SceneLightSet {
+    std::string name;
+    float max_weight = 1;
+};
+
+struct SceneDoor {
+    std::string name;
+    bool pose = false;                    // open means: stands in its open pose; else it is ignored
+    glm::vec4 open_rotation{0, 0, 0, 1};  // quaternion x y z w, relative to the closed pose
+    glm::vec3 open_translation_m{0};
+};
+
+struct SceneViewpoint {
+    std::string name;
+    glm::vec3 position_m{0};
+    glm::vec3 forward{0, 0, -1};
+    float vertical_fov_rad = 1.0f;
+};
+
+// Names one element: index into light_sets or doors.
+struct ElementRef {
+    bool is_door = false;
+    uint32_t index = 0;
+};
+
+struct Scene {
+    std::string file;
+    std::vector<Material> materials;
+    std::vector<Image> images;
+    std::vector<SceneMesh> meshes;  // dynamic ones included; they neither block nor reflect
+    std::vector<PunctualLight> lights;
+    std::vector<SceneLightSet> light_sets;  // in order of first appearance
+    std::vector<SceneDoor> doors;           // in order of first appearance
+    std::vector<std::vector<ElementRef>> combinations;
+    std::vector<SceneViewpoint> viewpoints;   // "player_start" first when there is one, then glTF cameras
+    std::vector<glm::vec3> dynamic_places_m;  // dimmer_dynamic on an empty node
+    glm::vec3 sky_radiance_cd_m2{0};
+    std::vector<std::string> warnings;  // each names the file, the node and what was done
+};
+
+// Reads .glb or .gltf. Errors (ErrorCode::BadInput or Io) name the file, the node and the mend.
+// The level's meaning is specified in docs/level.md.
+Expected<Scene> importLevel(const std::filesystem::path& path);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,192 @@
+#include <trace/ray_scene.h>
+
+#include <bake/sampling.h>
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+
+namespace dimmer::cook {
+namespace {
+
+// Embree ray masks: what must be asked for its alpha is a geometry of its own, so that opaque rays skip it.
+constexpr unsigned mask_opaque = 1, mask_transparent = 2;
+// After passing a transparent surface a ray starts anew this far behind it.
+constexpr float step_past_m = 1e-4f;
+// A ray that passes more surfaces than this is taken to be stopped; real levels stack a handful.
+constexpr int transparent_layers_max = 64;
+
+}  // namespace
+
+struct RayScene::Embree {
+    RTCDevice device = rtcNewDevice(nullptr);
+    RTCScene scene = rtcNewScene(device);
+    std::vector<uint32_t> triangle_of[2];  // Embree primitive -> level triangle, per geometry
+
+    ~Embree() {
+        rtcReleaseScene(scene);
+        rtcReleaseDevice(device);
+    }
+
+    void attach(unsigned geometry_id, const RayScene& level) {
+        const auto& list = triangle_of[geometry_id];
+        if (list.empty()) return;
+        RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
+            geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), list.size() * 3));
+        auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
+            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), list.size()));
+        for (size_t t = 0; t < list.size(); ++t)
+            for (int i = 0; i < 3; ++i) {
+                const glm::vec3 p = level.corner(list[t], i);
+                const size_t vertex = t * 3 + static_cast<size_t>(i);
+                positions[vertex * 3] = p.x;
+                positions[vertex * 3 + 1] = p.y;
+                positions[vertex * 3 + 2] = p.z;
+                indices[vertex] = static_cast<unsigned>(vertex);
+            }
+        rtcSetGeometryMask(geometry, geometry_id == 0 ? mask_opaque : mask_transparent);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometryByID(scene, geometry, geometry_id);
+        rtcReleaseGeometry(geometry);
+    }
+
+    bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m,
+                   unsigned mask) const {
+        ray_hit.ray = {.org_x = origin.x,
+                       .org_y = origin.y,
+                       .org_z = origin.z,
+                       .tnear = near_m,
+                       .dir_x = direction.x,
+                       .dir_y = direction.y,
+                       .dir_z = direction.z,
+                       .time = 0,
+                       .tfar = far_m,
+                       .mask = mask,
+                       .id = 0,
+                       .flags = 0};
+        ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcIntersect1(scene, &context, &ray_hit);
+        return ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    }
+
+    bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask) const {
+        RTCRay ray{.org_x = origin.x,
+                   .org_y = origin.y,
+                   .org_z = origin.z,
+                   .tnear = 0,
+                   .dir_x = direction.x,
+                   .dir_y = direction.y,
+                   .dir_z = direction.z,
+                   .time = 0,
+                   .tfar = far_m,
+                   .mask = mask,
+                   .id = 0,
+                   .flags = 0};
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcOccluded1(scene, &context, &ray);
+        return ray.tfar < 0;
+    }
+};
+
+RayScene::RayScene(const Scene& scene) : scene_(scene), embree_(std::make_unique<Embree>()) {
+    bounds_min_ = glm::vec3(std::numeric_limits<float>::max());
+    bounds_max_ = glm::vec3(std::numeric_limits<float>::lowest());
+    for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
+        const SceneMesh& mesh = scene.meshes[m];
+        if (mesh.lighting == Lighting::Dynamic) continue;
+        for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+            const auto level_triangle = static_cast<uint32_t>(triangles_.size());
+            triangles_.push_back({.mesh = m, .triangle = t, .material = mesh.triangle_materials[t]});
+            const glm::vec3 a = corner(level_triangle, 0), b = corner(level_triangle, 1), c = corner(level_triangle, 2);
+            triangles_.back().normal = glm::normalize(glm::cross(b - a, c - a));
+            bounds_min_ = glm::min(bounds_min_, glm::min(a, glm::min(b, c)));
+            bounds_max_ = glm::max(bounds_max_, glm::max(a, glm::max(b, c)));
+            const bool transparent = scene.materials[mesh.triangle_materials[t]].alpha_mode != AlphaMode::Opaque;
+            embree_->triangle_of[transparent].push_back(level_triangle);
+        }
+    }
+    any_transparent_ = !embree_->triangle_of[1].empty();
+    embree_->attach(0, *this);
+    embree_->attach(1, *this);
+    // Robust: rays must not slip through the edges that closed rooms are made of.
+    rtcSetSceneFlags(embree_->scene, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(embree_->scene, RTC_BUILD_QUALITY_HIGH);
+    rtcCommitScene(embree_->scene);
+}
+
+RayScene::~RayScene() = default;
+
+glm::vec3 RayScene::corner(uint32_t triangle, int i) const {
+    const LevelTriangle& t = triangles_[triangle];
+    const SceneMesh& mesh = scene_.meshes[t.mesh];
+    return mesh.positions_m[mesh.triangles[t.triangle][i]];
+}
+
+glm::vec3 RayScene::pointOn(uint32_t triangle, float u, float v) const {
+    return (1 - u - v) * corner(triangle, 0) + u * corner(triangle, 1) + v * corner(triangle, 2);
+}
+
+glm::vec4 RayScene::surfaceColor(uint32_t triangle, float u, float v) const {
+    const LevelTriangle& t = triangles_[triangle];
+    const SceneMesh& mesh = scene_.meshes[t.mesh];
+    const Material& material = scene_.materials[t.material];
+    glm::vec4 color(material.base_color, material.alpha);
+    if (material.base_color_image && !mesh.uv0.empty()) {
+        const glm::uvec3 index = mesh.triangles[t.triangle];
+        const glm::vec2 uv = (1 - u - v) * mesh.uv0[index.x] + u * mesh.uv0[index.y] + v * mesh.uv0[index.z];
+        color *= scene_.images[*material.base_color_image].sample(uv);
+    }
+    return color;
+}
+
+float RayScene::alphaAt(uint32_t triangle, float u, float v) const {
+    const Material& material = scene_.materials[triangles_[triangle].material];
+    const float alpha = surfaceColor(triangle, u, v).a;
+    if (material.alpha_mode == AlphaMode::Mask) return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
+    return std::clamp(alpha, 0.0f, 1.0f);
+}
+
+std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed) const {
+    float near_m = 0;
+    for (int layer = 0; layer < transparent_layers_max; ++layer) {
+        RTCRayHit r;
+        if (!embree_->intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent))
+            return std::nullopt;
+        const uint32_t triangle = embree_->triangle_of[r.hit.geomID][r.hit.primID];
+        const Hit hit{.triangle = triangle,
+                      .distance_m = r.ray.tfar,
+                      .u = r.hit.u,
+                      .v = r.hit.v,
+                      .back = glm::dot(direction, triangles_[triangle].normal) > 0};
+        if (r.hit.geomID == 0) return hit;
+        if (unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v)) return hit;
+        near_m = r.ray.tfar + step_past_m;
+    }
+    return std::nullopt;
+}
+
+float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
+    if (embree_->occluded(origin, direction, distance_m, mask_opaque)) return 0;
+    float passed = 1, near_m = 0;
+    for (int layer = 0; any_transparent_ && layer < transparent_layers_max; ++layer) {
+        RTCRayHit r;
+        if (!embree_->intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
+        passed *= 1 - alphaAt(embree_->triangle_of[1][r.hit.primID], r.hit.u, r.hit.v);
+        if (passed <= 0) return 0;
+        near_m = r.ray.tfar + step_past_m;
+    }
+    return passed;
+}
+
+bool RayScene::blocked(glm::vec3 from, glm::vec3 to) const {
+    const float distance_m = glm::length(to - from);
+    return distance_m > 0 && embree_->occluded(from, (to - from) / distance_m, distance_m, mask_opaque);
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,197 @@
+#include <write/pack_writer.h>
+
+#include <format/byte_stream.h>
+#include <format/hash.h>
+#include <format/layout.h>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <zstd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace dimmer::cook {
+namespace {
+
+using format::ByteWriter;
+using format::Chunk;
+using format::ChunkType;
+
+// zstd level: packs are written seldom and read often; 12 is where size stops paying for time on our levels.
+constexpr int compression_level = 12;
+
+class Writer {
+   public:
+    explicit Writer(const PackData& data) : d_(data) {}
+
+    std::vector<std::byte> write() {
+        addTable(ChunkType::Elements, [&](ByteWriter& out) { putElements(out); });
+        addTable(ChunkType::Contributions, [&](ByteWriter& out) { putContributions(out); });
+        addArray(ChunkType::BasePages, std::span(d_.base_pages));
+        addArray(ChunkType::Clusters, std::span(d_.clusters));
+        addArray(ChunkType::Terms, std::span(d_.terms));
+        addArray(ChunkType::Batches, std::span(d_.batches));
+        addArray(ChunkType::Addresses, std::span(d_.addresses));
+        size_t first = 0;
+        for (uint32_t k = 0; k < d_.contributions.size(); ++k) {
+            addArray(ChunkType::Payload, std::span(d_.payload).subspan(first, d_.contributions[k].receivers), k);
+            first += d_.contributions[k].receivers;
+        }
+        addTable(ChunkType::Meshes, [&](ByteWriter& out) { putMeshes(out); });
+        addTable(ChunkType::Viewpoints, [&](ByteWriter& out) { putViewpoints(out); });
+        addTable(ChunkType::Settings, [&](ByteWriter& out) { out.putString(d_.settings_json); });
+        return assemble();
+    }
+
+   private:
+    void add(ChunkType type, uint32_t subject, std::span<const std::byte> bytes, uint32_t record_bytes) {
+        std::vector<std::byte> shuffled(bytes.size());
+        const size_t count = bytes.size() / record_bytes;
+        for (size_t b = 0; b < record_bytes; ++b)
+            for (size_t i = 0; i < count; ++i) shuffled[b * count + i] = bytes[i * record_bytes + b];
+        std::vector<std::byte> stored(ZSTD_compressBound(shuffled.size()));
+        stored.resize(ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), compression_level));
+        chunks_.push_back({.type = static_cast<uint32_t>(type),
+                           .flags = 0,
+                           .subject = subject,
+                           .shuffle = record_bytes,
+                           .offset = 0,
+                           .stored_bytes = stored.size(),
+                           .real_bytes = bytes.size(),
+                           .xxh64 = format::chunkHash(stored)});
+        bodies_.push_back(std::move(stored));
+    }
+
+    template <class T>
+    void addArray(ChunkType type, std::span<const T> values, uint32_t subject = 0) {
+        add(type, subject, std::as_bytes(values), sizeof(T));
+    }
+
+    void addTable(ChunkType type, auto&& fill) {
+        ByteWriter out;
+        fill(out);
+        add(type, 0, out.take(), 1);
+    }
+
+    static void putOptional(ByteWriter& out, std::optional<uint32_t> index) { out.put(index.value_or(UINT32_MAX)); }
+
+    void putElements(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.elements.size()));
+        for (const Element& e : d_.elements) {
+            out.putString(e.name);
+            out.put(static_cast<uint32_t>(e.kind));
+            out.put(e.max_weight);
+        }
+    }
+
+    void putContributions(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.contributions.size()));
+        for (const Contribution& c : d_.contributions) {
+            putOptional(out, c.light_set);
+            out.putArray(std::span<const uint32_t>(c.doors_open));
+            out.putArray(std::span<const uint32_t>(c.doors_closed));
+            out.put(c.receivers);
+            out.put(c.energy_dropped);
+        }
+    }
+
+    void putMeshes(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.meshes.size()));
+        for (const Mesh& m : d_.meshes) {
+            out.putString(m.node);
+            out.put(m.page);
+            putOptional(out, m.door);
+            out.put(m.reflectance);
+            out.put(m.emission_cd_m2);
+            putOptional(out, m.emission_set);
+            out.putArray(std::span<const MeshVertex>(m.vertices));
+            out.putArray(std::span<const uint32_t>(m.indices));
+        }
+    }
+
+    void putViewpoints(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.viewpoints.size()));
+        for (const Viewpoint& v : d_.viewpoints) {
+            out.putString(v.name);
+            out.put(v.position_m);
+            out.put(v.forward);
+            out.put(v.vertical_fov_rad);
+        }
+    }
+
+    std::vector<std::byte> assemble() {
+        auto align = [](uint64_t v) {
+            return (v + format::chunk_alignment_bytes - 1) / format::chunk_alignment_bytes *
+                   format::chunk_alignment_bytes;
+        };
+        uint64_t end = sizeof(format::Header) + chunks_.size() * sizeof(Chunk);
+        for (Chunk& c : chunks_) {
+            c.offset = align(end);
+            end = c.offset + c.stored_bytes;
+        }
+        format::Header header{.magic = format::magic,
+                              .version = format::version,
+                              .endian_tag = format::endian_tag,
+                              .file_bytes = end,
+                              .xxh64 = 0,
+                              .exposure = d_.exposure,
+                              .page_width = d_.page_width,
+                              .page_height = d_.page_height,
+                              .page_count = d_.page_count,
+                              .chunk_count = static_cast<uint32_t>(chunks_.size()),
+                              .reserved = {}};
+        header.xxh64 = format::headerHash(header, std::as_bytes(std::span(chunks_)));
+        std::vector<std::byte> file(end);
+        std::memcpy(file.data(), &header, sizeof(header));
+        std::memcpy(file.data() + sizeof(header), chunks_.data(), chunks_.size() * sizeof(Chunk));
+        for (size_t i = 0; i < chunks_.size(); ++i)
+            std::memcpy(file.data() + chunks_[i].offset, bodies_[i].data(), bodies_[i].size());
+        return file;
+    }
+
+    const PackData& d_;
+    std::vector<Chunk> chunks_;
+    std::vector<std::vector<std::byte>> bodies_;
+};
+
+std::unexpected<Error> ioError(const std::filesystem::path& path, std::string_view what) {
+    return fail(ErrorCode::Io, fmt::format("{}: {}: {}; nothing was changed", path.string(), what, strerror(errno)));
+}
+
+}  // namespace
+
+std::vector<std::byte> packBytes(const PackData& data) {
+    return Writer(data).write();
+}
+
+Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    std::string temporary = path.string() + ".XXXXXX";
+    const int file = mkstemp(temporary.data());
+    if (file < 0) return ioError(path, "cannot write in this folder");
+    auto abandon = [&](std::string_view what) {
+        auto error = ioError(path, what);
+        close(file);
+        unlink(temporary.c_str());
+        return error;
+    };
+    for (size_t done = 0; done < bytes.size();) {
+        const ssize_t n = ::write(file, bytes.data() + done, bytes.size() - done);
+        if (n < 0 && errno != EINTR) return abandon("cannot write the pack");
+        if (n > 0) done += static_cast<size_t>(n);
+    }
+    const mode_t mask = umask(0);
+    umask(mask);
+    if (fchmod(file, 0666 & ~mask) != 0 || fsync(file) != 0) return abandon("cannot flush the pack");
+    close(file);
+    if (rename(temporary.c_str(), path.c_str()) != 0) {
+        auto error = ioError(path, "cannot put the finished pack in its place");
+        unlink(temporary.c_str());
+        return error;
+    }
+    return {};
+}
+
+}  // namespace dimmer::cook

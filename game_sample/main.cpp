@@ -1,0 +1,130 @@
+// dimmer-sample: a small game without a player. Arguments in, exit code out; the work is in player.cpp.
+#include "player.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <sstream>
+
+namespace {
+
+using namespace dimmer;
+using namespace dimmer::sample;
+
+constexpr int exit_done = 0, exit_fault = 1, exit_bad_input = 2;
+
+struct Arguments {
+    std::string pack, script, out = "out/sample", size, camera;
+    uint32_t frames = 0;
+    bool headless = false, validate = false;
+};
+
+void declare(CLI::App& app, Arguments& arguments) {
+    app.add_option("pack", arguments.pack, "The cooked level (*.dimmer)")->required();
+    app.add_option("--script", arguments.script,
+                   "What to play: a text file, see demo.script (default: one frame, every light set at 1)");
+    app.add_flag("--headless", arguments.headless, "Write pictures instead of opening a window (the only mode so far)");
+    app.add_option("--out", arguments.out, "Folder for frame_0000.png ... and cost.json; made when missing")
+        ->capture_default_str();
+    app.add_option("--frames", arguments.frames, "Number of frames (default: the script's)")
+        ->check(CLI::Range(1u, frame_count_max));
+    app.add_option("--size", arguments.size, "Picture size in pixels, WxH (default: the script's, else 960x540)");
+    app.add_option("--camera", arguments.camera,
+                   "Name of the camera to begin with (default: the script's, else the level's first)");
+    app.add_flag("--validate", arguments.validate, "Run under the Vulkan validation layers; exit 1 if they complain");
+    app.footer(
+        "Example: dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
+        "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
+}
+
+int report(const Error& error) {
+    fmt::print(stderr, "dimmer-sample: {}\n", error.message);
+    switch (error.code) {
+        case ErrorCode::InvalidArgument:
+        case ErrorCode::NotFound:
+        case ErrorCode::BadInput:
+        case ErrorCode::Io:
+            return exit_bad_input;
+        default:
+            return exit_fault;
+    }
+}
+
+Expected<std::string> readText(const std::string& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::ostringstream text;
+    text << file.rdbuf();
+    if (!file || !text) return fail(ErrorCode::Io, fmt::format("{}: cannot be read.", path));
+    return text.str();
+}
+
+Expected<void> applySize(const std::string& size, Script& script) {
+    uint32_t width = 0, height = 0;
+    char x = 0, rest = 0;
+    std::istringstream in(size);
+    const auto valid = [](uint32_t side) { return side >= 1 && side <= image_side_max; };
+    if (!(in >> width >> x >> height) || x != 'x' || in >> rest || !valid(width) || !valid(height))
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("--size {}: not WxH with sides of 1..{} pixels; an example: "
+                                "960x540.",
+                                size, image_side_max));
+    script.width = width;
+    script.height = height;
+    return {};
+}
+
+// The script with what the command line overrides.
+Expected<Script> prepareScript(const Arguments& arguments, const Pack& pack) {
+    std::string text;
+    if (arguments.script.empty()) {
+        text = "frames 1";
+    } else {
+        auto read = readText(arguments.script);
+        if (!read) return std::unexpected(read.error());
+        text = std::move(*read);
+    }
+    auto script = parseScript(text, arguments.script, pack);
+    if (!script) return script;
+    if (arguments.frames) script->frames = arguments.frames;
+    if (!arguments.size.empty())
+        if (auto done = applySize(arguments.size, *script); !done) return std::unexpected(done.error());
+    if (!arguments.camera.empty()) {
+        const auto camera = findCamera(pack, arguments.camera);
+        if (!camera) return std::unexpected(camera.error());
+        script->camera = *camera;
+    }
+    return script;
+}
+
+int run(const Arguments& arguments) {
+    if (!arguments.headless) {
+        fmt::print(stderr,
+                   "dimmer-sample: there is no window yet; add --headless to write pictures to the folder --out.\n");
+        return exit_bad_input;
+    }
+    const auto pack = Pack::open(arguments.pack);
+    if (!pack) return report(pack.error());
+    const auto script = prepareScript(arguments, *pack);
+    if (!script) return report(script.error());
+    const auto played = playHeadless(*pack, *script, {arguments.pack, arguments.out, arguments.validate});
+    if (!played) return report(played.error());
+
+    fmt::print("{}", played->cost.table(played->device, played->driver));
+    for (const std::string& message : played->validation_messages) fmt::print(stderr, "validation: {}\n", message);
+    return played->validation_messages.empty() ? exit_done : exit_fault;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    CLI::App app("Plays a script of light switches on a cooked level and writes what one sees, with what it cost.");
+    Arguments arguments;
+    declare(app, arguments);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+        return app.exit(error) == 0 ? exit_done : exit_bad_input;
+    }
+    return run(arguments);
+}

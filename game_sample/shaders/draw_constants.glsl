@@ -1,0 +1,25 @@
+// What one draw call gets as push constants: shared by C++ (level_renderer.cpp) and GLSL (level.vert, level.frag).
+#ifndef DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
+#define DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
+
+#ifdef __cplusplus
+#include <glm/glm.hpp>
+namespace dimmer::sample {
+using glm::mat4;
+using glm::vec3;
+#endif
+
+struct DrawConstants {
+    mat4 clip_from_world;
+    vec3 reflectance;     // Lambert, linear Rec.709
+    float page;           // of the lightmap
+    vec3 emission_cd_m2;  // times the weight of its light set
+    float exposure;       // Pack::exposure()
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(DrawConstants) == 96);  // every device takes 128
+}  // namespace dimmer::sample
+#endif
+
+#endif

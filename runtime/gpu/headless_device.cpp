@@ -1,0 +1,225 @@
+#include <fmt/format.h>
+#include <gpu/headless_device.h>
+#include <gpu/vk_result.h>
+#include <gpu/vk_struct.h>
+
+#include <algorithm>
+#include <mutex>
+#include <optional>
+
+namespace dimmer {
+namespace {
+
+constexpr const char* validation_layer = "VK_LAYER_KHRONOS_validation";
+
+struct MessageLog {
+    std::mutex mutex;
+    std::vector<std::string> messages;
+};
+
+VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
+                                         const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
+    auto& log = *static_cast<MessageLog*>(user);
+    const std::scoped_lock lock(log.mutex);
+    log.messages.emplace_back(data->pMessage);
+    return VK_FALSE;
+}
+
+VkDebugUtilsMessengerCreateInfoEXT messengerInfo(MessageLog& log) {
+    auto info = vkStruct<VkDebugUtilsMessengerCreateInfoEXT>(VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT);
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
+    info.pfnUserCallback = onMessage;
+    info.pUserData = &log;
+    return info;
+}
+
+bool layerInstalled(const char* name) {
+    uint32_t count = 0;
+    vkEnumerateInstanceLayerProperties(&count, nullptr);
+    std::vector<VkLayerProperties> layers(count);
+    vkEnumerateInstanceLayerProperties(&count, layers.data());
+    return std::any_of(layers.begin(), layers.end(),
+                       [&](const auto& layer) { return std::string_view(layer.layerName) == name; });
+}
+
+std::vector<VkQueueFamilyProperties> queueFamilies(VkPhysicalDevice device) {
+    uint32_t count = 0;
+    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
+    std::vector<VkQueueFamilyProperties> families(count);
+    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
+    return families;
+}
+
+// A family that draws and computes, else, where drawing is not asked for, one that computes.
+std::optional<uint32_t> findQueueFamily(VkPhysicalDevice device, bool graphics) {
+    const auto families = queueFamilies(device);
+    constexpr VkQueueFlags both = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT;
+    for (uint32_t i = 0; i < families.size(); ++i)
+        if ((families[i].queueFlags & both) == both) return i;
+    for (uint32_t i = 0; i < families.size() && !graphics; ++i)
+        if (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) return i;
+    return std::nullopt;
+}
+
+bool hasTimelineSemaphores(VkPhysicalDevice device) {
+    auto features12 = vkStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+    auto features = vkStruct<VkPhysicalDeviceFeatures2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, &features12);
+    vkGetPhysicalDeviceFeatures2(device, &features);
+    return features12.timelineSemaphore;
+}
+
+// Smaller is better.
+int preference(VkPhysicalDeviceType type) {
+    switch (type) {
+        case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+            return 0;
+        case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+            return 1;
+        case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+            return 2;
+        default:
+            return 3;
+    }
+}
+
+}  // namespace
+
+struct HeadlessDevice::Impl {
+    MessageLog log;  // before the instance: its messenger writes here to the very end
+    VulkanContext vulkan;
+    VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
+    std::string name, driver;
+
+    ~Impl() {
+        if (vulkan.device) vkDestroyDevice(vulkan.device, nullptr);
+        if (messenger) {
+            const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
+                vkGetInstanceProcAddr(vulkan.instance, "vkDestroyDebugUtilsMessengerEXT"));
+            destroy(vulkan.instance, messenger, nullptr);
+        }
+        if (vulkan.instance) vkDestroyInstance(vulkan.instance, nullptr);
+    }
+
+    Expected<void> createInstance(bool validation);
+    Expected<void> choosePhysicalDevice(bool graphics);
+    Expected<void> createDevice();
+};
+
+Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
+    if (validation && !layerInstalled(validation_layer))
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("The Vulkan layer {} is not installed (Debian: vulkan-validationlayers).", validation_layer));
+
+    auto application = vkStruct<VkApplicationInfo>(VK_STRUCTURE_TYPE_APPLICATION_INFO);
+    application.pApplicationName = "Dimmer";
+    application.apiVersion = VK_API_VERSION_1_2;
+
+    const VkValidationFeatureEnableEXT enabled[] = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
+    auto features = vkStruct<VkValidationFeaturesEXT>(VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT);
+    features.enabledValidationFeatureCount = 1;
+    features.pEnabledValidationFeatures = enabled;
+    VkDebugUtilsMessengerCreateInfoEXT debug = messengerInfo(log);
+    debug.pNext = &features;
+
+    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME};
+    auto info = vkStruct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
+    info.pApplicationInfo = &application;
+    if (validation) {
+        info.pNext = &debug;
+        info.enabledLayerCount = 1;
+        info.ppEnabledLayerNames = &validation_layer;
+        info.enabledExtensionCount = 1;
+        info.ppEnabledExtensionNames = extensions;
+    }
+    DIMMER_VK(vkCreateInstance, &info, nullptr, &vulkan.instance);
+
+    if (validation) {
+        const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
+            vkGetInstanceProcAddr(vulkan.instance, "vkCreateDebugUtilsMessengerEXT"));
+        const VkDebugUtilsMessengerCreateInfoEXT messenger_info = messengerInfo(log);
+        DIMMER_VK(create, vulkan.instance, &messenger_info, nullptr, &messenger);
+    }
+    return {};
+}
+
+Expected<void> HeadlessDevice::Impl::choosePhysicalDevice(bool graphics) {
+    uint32_t count = 0;
+    DIMMER_VK(vkEnumeratePhysicalDevices, vulkan.instance, &count, nullptr);
+    std::vector<VkPhysicalDevice> devices(count);
+    DIMMER_VK(vkEnumeratePhysicalDevices, vulkan.instance, &count, devices.data());
+
+    int best = 4;
+    for (VkPhysicalDevice candidate : devices) {
+        auto driver_properties =
+            vkStruct<VkPhysicalDeviceDriverProperties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_DRIVER_PROPERTIES);
+        auto properties = vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2);
+        vkGetPhysicalDeviceProperties(candidate, &properties.properties);
+        if (properties.properties.apiVersion < VK_API_VERSION_1_2 || !hasTimelineSemaphores(candidate)) continue;
+        const auto family = findQueueFamily(candidate, graphics);
+        const int rank = preference(properties.properties.deviceType);
+        if (!family || rank >= best) continue;
+
+        properties.pNext = &driver_properties;
+        vkGetPhysicalDeviceProperties2(candidate, &properties);
+        best = rank;
+        vulkan.physical_device = candidate;
+        vulkan.queue_family = *family;
+        name = properties.properties.deviceName;
+        driver = fmt::format("{} {}", driver_properties.driverName, driver_properties.driverInfo);
+    }
+    if (!vulkan.physical_device)
+        return fail(ErrorCode::Unsupported,
+                    fmt::format("No Vulkan 1.2 device with a queue for {} was found among {}. On Debian the package "
+                                "mesa-vulkan-drivers brings one that runs on the CPU.",
+                                graphics ? "drawing and compute" : "compute", count));
+    return {};
+}
+
+Expected<void> HeadlessDevice::Impl::createDevice() {
+    const float priority = 1;
+    auto queue = vkStruct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+    queue.queueFamilyIndex = vulkan.queue_family;
+    queue.queueCount = 1;
+    queue.pQueuePriorities = &priority;
+    auto features = vkStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
+    features.timelineSemaphore = VK_TRUE;
+    auto info = vkStruct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
+    info.queueCreateInfoCount = 1;
+    info.pQueueCreateInfos = &queue;
+    DIMMER_VK(vkCreateDevice, vulkan.physical_device, &info, nullptr, &vulkan.device);
+    vkGetDeviceQueue(vulkan.device, vulkan.queue_family, 0, &vulkan.queue);
+    return {};
+}
+
+Expected<HeadlessDevice> HeadlessDevice::create(const HeadlessOptions& options) {
+    auto impl = std::make_unique<Impl>();
+    DIMMER_TRY(impl->createInstance(options.validation));
+    DIMMER_TRY(impl->choosePhysicalDevice(options.graphics));
+    DIMMER_TRY(impl->createDevice());
+    return HeadlessDevice(std::move(impl));
+}
+
+HeadlessDevice::HeadlessDevice(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+HeadlessDevice::~HeadlessDevice() = default;
+HeadlessDevice::HeadlessDevice(HeadlessDevice&&) noexcept = default;
+HeadlessDevice& HeadlessDevice::operator=(HeadlessDevice&&) noexcept = default;
+
+VulkanContext HeadlessDevice::context() const {
+    return impl_->vulkan;
+}
+const std::string& HeadlessDevice::name() const {
+    return impl_->name;
+}
+const std::string& HeadlessDevice::driver() const {
+    return impl_->driver;
+}
+
+std::vector<std::string> HeadlessDevice::validationMessages() const {
+    const std::scoped_lock lock(impl_->log.mutex);
+    return impl_->log.messages;
+}
+
+}  // namespace dimmer

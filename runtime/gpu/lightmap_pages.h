@@ -1,0 +1,54 @@
+// The lightmap pages as two image arrays: sampled in their own formats, written by compute through R32_UINT views.
+#pragma once
+
+#include <gpu/transfer.h>
+#include <pack/pack_data.h>
+
+namespace dimmer {
+
+class LightmapPages {
+   public:
+    // Creates the images and fills them with the base; blocking. They end in SHADER_READ_ONLY_OPTIMAL.
+    static Expected<LightmapPages> create(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
+
+    LightmapImages images() const;
+    VkImageView irradianceStorageView() const { return irradiance_.storage_view.get(); }
+    VkImageView directionStorageView() const { return direction_.storage_view.get(); }
+
+    // Around the dispatches that write pages. The first waits for what sampled them earlier on the queue, the second
+    // lets later commands sample.
+    void beginWrites(VkCommandBuffer commands) const;
+    void endWrites(VkCommandBuffer commands) const;
+
+    // Blocking; both in the layout of CpuRuntime's pages.
+    Expected<Runtime::Pages> read(Transfer& transfer) const;
+
+   private:
+    struct PageArray {
+        GpuImage image;
+        ImageViewHandle sampled_view, storage_view;
+    };
+    struct State {
+        VkImageLayout layout;
+        VkPipelineStageFlags stages;
+        VkAccessFlags access;
+    };
+
+    Expected<PageArray> createArray(const VulkanContext& vulkan, VkFormat format) const;
+    Expected<void> createSampler(const VulkanContext& vulkan);
+    void transition(VkCommandBuffer commands, const State& from, const State& to) const;
+    State sampled() const;
+    Expected<void> fill(const PackData& data, Transfer& transfer);
+    // Calls copy(piece) for pieces of at most the staging buffer's size.
+    Expected<void> forEachPiece(
+        const std::function<Expected<void>(const VkBufferImageCopy&, size_t first_texel, size_t texels)>& copy) const;
+    Expected<void> readArray(Transfer& transfer, VkImage image, std::vector<uint32_t>& texels) const;
+
+    uint32_t width_ = 0, height_ = 0, layers_ = 0;
+    // Where shaders of the queue's family sample: fragment shaders only where it draws.
+    VkPipelineStageFlags sampling_stages_ = 0;
+    PageArray irradiance_, direction_;
+    SamplerHandle sampler_;
+};
+
+}  // namespace dimmer

@@ -1,0 +1,33 @@
+// Buffers and images with memory of their own. Few and large, so no allocator stands between them and the driver.
+#pragma once
+
+#include <dimmer/runtime.h>
+#include <gpu/vk_handle.h>
+
+#include <span>
+
+namespace dimmer {
+
+struct GpuBuffer {
+    MemoryHandle memory;  // before the buffer: freed after it
+    BufferHandle buffer;
+    std::byte* mapped = nullptr;  // host-visible buffers only; coherent, mapped until destruction
+    VkDeviceSize size_bytes = 0;
+};
+
+struct GpuImage {
+    MemoryHandle memory;
+    ImageHandle image;
+};
+
+enum class MemoryUse {
+    Device,    // read and written by the GPU
+    Upload,    // written by the host in order, read by the GPU
+    Readback,  // written by the GPU, read by the host
+};
+
+Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
+                                 MemoryUse memory);
+Expected<GpuImage> createImage(const VulkanContext& vulkan, const VkImageCreateInfo& info);
+
+}  // namespace dimmer

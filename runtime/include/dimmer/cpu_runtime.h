@@ -1,0 +1,37 @@
+// The CPU executor: the twin of the Vulkan runtime, bit for bit on devices with IEEE arithmetic. For tests, tools and
+// servers without a GPU.
+#pragma once
+
+#include <dimmer/light_state.h>
+
+#include <array>
+#include <span>
+#include <vector>
+
+namespace dimmer {
+
+class CpuRuntime : public LightState {
+   public:
+    explicit CpuRuntime(const Pack& pack);
+
+    // Blends what changed since the last call into the pages. Nothing changed: returns at once. Not thread-safe.
+    UpdateStats update();
+
+    // The lightmap pages, one after another, rows from the top; in the sampled formats: B10G11R11_UFLOAT_PACK32 and
+    // R8G8B8A8_UNORM.
+    std::span<const uint32_t> irradiancePages() const { return irradiance_; }
+    std::span<const uint32_t> directionPages() const { return direction_; }
+
+   private:
+    std::vector<uint32_t> irradiance_;
+    std::vector<uint32_t> direction_;
+};
+
+// Irradiance in lux, bilinear, of pages as above (from either runtime). `uv` is 0..1 over the page; `normal_tangent`
+// the unit normal in the texel's tangent frame, (0,0,1) for the surface's own. Thread-safe. The CPU twin of
+// dimmer_lightmap_irradiance in sample.glsl.
+std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> irradiance_pages,
+                                    std::span<const uint32_t> direction_pages, uint32_t page, std::array<float, 2> uv,
+                                    std::array<float, 3> normal_tangent);
+
+}  // namespace dimmer

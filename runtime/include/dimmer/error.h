@@ -1,0 +1,34 @@
+// Errors are values: every call that can fail returns Expected<T>; nothing throws across the API.
+#pragma once
+
+#include <expected>
+#include <string>
+#include <utility>
+
+namespace dimmer {
+
+enum class ErrorCode {
+    InvalidArgument,  // the caller's value is out of its range; nothing was changed
+    NotFound,         // no light set, door or file of that name
+    BadInput,         // a file's content cannot be used; the message says where and how to mend it
+    Unsupported,      // the device or this build lacks something that is needed
+    OutOfMemory,      // host or device memory
+    DeviceLost,       // the Vulkan device is gone; destroy the runtime and create it anew
+    OverBudget,       // the result does not fit the profile's budget
+    Io,               // a file could not be read or written
+    Internal,         // a broken promise of ours; please report it
+};
+
+struct Error {
+    ErrorCode code = ErrorCode::Internal;
+    std::string message;  // one or two full sentences, with the name of the thing concerned
+};
+
+template <class T>
+using Expected = std::expected<T, Error>;
+
+inline std::unexpected<Error> fail(ErrorCode code, std::string message) {
+    return std::unexpected(Error{code, std::move(message)});
+}
+
+}  // namespace dimmer

@@ -1,0 +1,78 @@
+// What the game controls: the weights of light sets and doors. Both runtimes (Vulkan and CPU) are one.
+#pragma once
+
+#include <dimmer/error.h>
+#include <dimmer/pack.h>
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+namespace dimmer {
+
+class Planner;
+
+// Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack.
+struct LightSet {
+    uint32_t element = 0;
+};
+struct Door {
+    uint32_t element = 0;
+};
+
+// How strongly a light set shines, per linear Rec.709 channel; 1 is as baked. A scalar dims, three numbers recolour.
+struct Weight {
+    float r = 1, g = 1, b = 1;
+    Weight() = default;
+    Weight(float scalar) : r(scalar), g(scalar), b(scalar) {}  // NOLINT: a weight is a number to the game
+    Weight(float red, float green, float blue) : r(red), g(green), b(blue) {}
+    bool operator==(const Weight&) const = default;
+};
+
+// Not thread-safe: call from one thread at a time. Nothing here touches a GPU; a change costs nanoseconds and takes
+// effect with the runtime's next update. At the start every set has weight 1 and every door is closed.
+class LightState {
+   public:
+    ~LightState();
+    LightState(LightState&&) noexcept;
+    LightState& operator=(LightState&&) noexcept;
+
+    Expected<LightSet> lightSet(std::string_view name) const;
+    Expected<Door> door(std::string_view name) const;
+
+    // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum.
+    Expected<void> setWeight(LightSet set, Weight weight);
+    // `open`: 0 closed .. 1 open.
+    Expected<void> setDoor(Door door, float open);
+    // All at once, e.g. "hall=0.5,alarm=1/0.2/0.2,door:front=1"; "all=0" sets every light set first, wherever it is
+    // written. What is not named keeps its weight. On an error nothing has changed.
+    Expected<void> apply(std::string_view state);
+
+    Weight weight(LightSet set) const;
+    float open(Door door) const;
+    const Pack& pack() const { return pack_; }
+
+   protected:
+    explicit LightState(const Pack& pack);
+    Planner& planner() { return *planner_; }
+    const Planner& planner() const { return *planner_; }
+
+   private:
+    Pack pack_;
+    std::unique_ptr<Planner> planner_;
+};
+
+// What one update touched. Bytes are those that the kernels read and write, by count of records.
+struct UpdateStats {
+    uint32_t contributions_changed = 0;
+    uint32_t clusters = 0;
+    uint32_t batches = 0;
+    uint64_t receivers = 0;
+    uint32_t dispatches = 0;
+    uint64_t bytes_read = 0;
+    uint64_t bytes_written = 0;
+    double host_us = 0;  // planning and recording
+    double gpu_us = 0;   // by timestamps; 0 when the device has none or nothing ran
+};
+
+}  // namespace dimmer

@@ -1,0 +1,64 @@
+#include <dimmer/pack.h>
+
+#include <pack/pack_data.h>
+#include <pack/pack_reader.h>
+
+#include <fmt/format.h>
+
+#include <fstream>
+
+namespace dimmer {
+
+Expected<Pack> Pack::fromData(PackData data) {
+    if (auto ok = validate(data); !ok) return std::unexpected(ok.error());
+    return Pack(std::make_shared<const PackData>(std::move(data)));
+}
+
+Expected<Pack> Pack::fromBytes(std::span<const std::byte> bytes, std::string_view name) {
+    auto in_file = [&](const Error& error) { return Error{error.code, fmt::format("{}: {}", name, error.message)}; };
+    auto data = readPack(bytes);
+    if (!data) return std::unexpected(in_file(data.error()));
+    auto pack = fromData(std::move(*data));
+    if (!pack) return std::unexpected(in_file(pack.error()));
+    return pack;
+}
+
+Expected<Pack> Pack::open(const std::filesystem::path& path) {
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path, error);
+    std::ifstream file(path, std::ios::binary);
+    if (error || !file)
+        return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(),
+                                               error ? error.message() : "no permission to read"));
+    std::vector<std::byte> bytes(size);
+    if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
+        return fail(ErrorCode::Io, fmt::format("{}: reading stopped before its end", path.string()));
+    return fromBytes(bytes, path.string());
+}
+
+std::span<const Element> Pack::elements() const {
+    return data_->elements;
+}
+std::span<const Contribution> Pack::contributions() const {
+    return data_->contributions;
+}
+std::span<const Mesh> Pack::meshes() const {
+    return data_->meshes;
+}
+std::span<const Viewpoint> Pack::viewpoints() const {
+    return data_->viewpoints;
+}
+uint32_t Pack::pageCount() const {
+    return data_->page_count;
+}
+uint32_t Pack::pageWidth() const {
+    return data_->page_width;
+}
+uint32_t Pack::pageHeight() const {
+    return data_->page_height;
+}
+float Pack::exposure() const {
+    return data_->exposure;
+}
+
+}  // namespace dimmer

@@ -1,0 +1,70 @@
+// A pack in memory: what the reader has validated and the executors use. Arrays, no pointers between them.
+#pragma once
+
+#include <dimmer/pack.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace dimmer {
+
+// A stored lightmap texel, 8 bytes; see runtime/format/texel.h.
+struct TexelRecord {
+    uint32_t irradiance = 0;  // B10G11R11_UFLOAT_PACK32
+    uint32_t direction = 0;   // R8G8B8A8_UNORM
+    bool operator==(const TexelRecord&) const = default;
+};
+static_assert(sizeof(TexelRecord) == 8);
+
+// One contribution of a cluster and where its records are.
+struct ClusterTerm {
+    uint32_t contribution = 0;
+    uint32_t first_record = 0;  // into payload, one record per receiver of the cluster, in its order
+};
+
+// Receivers with the same list of contributions.
+struct Cluster {
+    uint32_t first_receiver = 0, receiver_count = 0;
+    uint32_t first_batch = 0, batch_count = 0;
+    uint32_t first_term = 0, term_count = 0;  // terms ascend by contribution
+};
+
+// Up to 64 consecutive receivers of one cluster: the work of one workgroup.
+struct Batch {
+    uint32_t first_receiver = 0, receiver_count = 0;
+};
+
+inline constexpr uint32_t batch_receivers_max = 64;
+
+// Where a receiver lives: x and y within a page of at most 4096 x 4096, up to 256 pages.
+struct TexelAddress {
+    static constexpr uint32_t pack(uint32_t page, uint32_t x, uint32_t y) { return page << 24 | y << 12 | x; }
+    static constexpr uint32_t page(uint32_t address) { return address >> 24; }
+    static constexpr uint32_t x(uint32_t address) { return address & 0xfff; }
+    static constexpr uint32_t y(uint32_t address) { return address >> 12 & 0xfff; }
+};
+inline constexpr uint32_t page_side_max = 4096;
+inline constexpr uint32_t page_count_max = 256;
+
+struct PackData {
+    float exposure = 1;
+    uint32_t page_width = 0, page_height = 0, page_count = 0;
+    std::vector<Element> elements;            // light sets first, then doors
+    std::vector<Contribution> contributions;  // without the base
+    std::vector<TexelRecord> base_pages;      // page_count * page_height * page_width
+    std::vector<Cluster> clusters;            // in order of first_receiver; they tile the receivers
+    std::vector<ClusterTerm> terms;
+    std::vector<Batch> batches;        // in order of first_receiver; they tile the receivers
+    std::vector<uint32_t> addresses;   // TexelAddress per receiver
+    std::vector<TexelRecord> payload;  // contribution-major: all records of contribution 0, then 1, ...
+    std::vector<Mesh> meshes;
+    std::vector<Viewpoint> viewpoints;
+    std::string settings_json;  // every resolved setting of the cook and where it came from
+};
+
+// Checks everything that an executor relies on: every index in range, clusters and batches tile the receivers,
+// addresses inside the pages and unique, finite floats. Linear in the size of the data.
+Expected<void> validate(const PackData& data);
+
+}  // namespace dimmer

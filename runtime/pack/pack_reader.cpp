@@ -1,0 +1,260 @@
+#include <pack/pack_reader.h>
+
+#include <format/byte_stream.h>
+#include <format/hash.h>
+#include <format/layout.h>
+
+#include <fmt/format.h>
+#include <zstd.h>
+
+#include <algorithm>
+
+namespace dimmer {
+namespace {
+
+using format::ByteReader;
+using format::Chunk;
+using format::ChunkType;
+
+// zstd can expand a few bytes to almost anything; records of light never compress that well, an empty page nearly so.
+constexpr uint64_t expansion_max = 4096;
+
+template <class... Args>
+std::unexpected<Error> bad(fmt::format_string<Args...> text, Args&&... args) {
+    return fail(ErrorCode::BadInput, fmt::format(text, std::forward<Args>(args)...) + "; copy or cook the pack again");
+}
+
+std::string name(ChunkType type) {
+    std::string text(4, '?');
+    for (size_t i = 0; i < 4; ++i) {
+        const char c = static_cast<char>(static_cast<uint32_t>(type) >> (8 * i));
+        if (c >= ' ' && c <= '~') text[i] = c;
+    }
+    return text;
+}
+
+std::string name(const Chunk& chunk) {
+    return name(static_cast<ChunkType>(chunk.type));
+}
+
+class Reader {
+   public:
+    explicit Reader(std::span<const std::byte> file) : file_(file) {}
+
+    Expected<PackData> read() {
+        if (auto ok = readHeader(); !ok) return std::unexpected(ok.error());
+        if (auto ok = readTable(); !ok) return std::unexpected(ok.error());
+        PackData d;
+        d.exposure = header_.exposure;
+        d.page_width = header_.page_width;
+        d.page_height = header_.page_height;
+        d.page_count = header_.page_count;
+        Expected<void> ok{};
+        auto then = [&](auto&& step) {
+            if (ok) ok = step();
+        };
+        then([&] { return table(ChunkType::Elements, [&](ByteReader& in) { readElements(in, d); }); });
+        then([&] { return table(ChunkType::Contributions, [&](ByteReader& in) { readContributions(in, d); }); });
+        then([&] { return array(ChunkType::BasePages, d.base_pages); });
+        then([&] { return array(ChunkType::Clusters, d.clusters); });
+        then([&] { return array(ChunkType::Terms, d.terms); });
+        then([&] { return array(ChunkType::Batches, d.batches); });
+        then([&] { return array(ChunkType::Addresses, d.addresses); });
+        then([&] { return readPayload(d); });
+        then([&] { return table(ChunkType::Meshes, [&](ByteReader& in) { readMeshes(in, d); }); });
+        then([&] { return table(ChunkType::Viewpoints, [&](ByteReader& in) { readViewpoints(in, d); }); });
+        then([&] { return table(ChunkType::Settings, [&](ByteReader& in) { d.settings_json = in.getString(); }); });
+        if (!ok) return std::unexpected(ok.error());
+        return d;
+    }
+
+   private:
+    Expected<void> readHeader() {
+        if (file_.size() < sizeof(header_))
+            return bad("the file has {} bytes, less than a pack's header", file_.size());
+        std::memcpy(&header_, file_.data(), sizeof(header_));
+        if (header_.magic != format::magic) return bad("this is not a Dimmer pack");
+        if (header_.endian_tag != format::endian_tag) return bad("the pack's byte order is not little-endian");
+        if (header_.version != format::version)
+            return bad("the pack is of format version {}, this build reads version {}", header_.version,
+                       format::version);
+        if (header_.file_bytes != file_.size())
+            return bad("the file has {} bytes, its header says {}", file_.size(), header_.file_bytes);
+        return {};
+    }
+
+    Expected<void> readTable() {
+        const auto body = file_.subspan(sizeof(header_));
+        if (header_.chunk_count > body.size() / sizeof(Chunk))
+            return bad("the table of {} chunks does not fit the file", header_.chunk_count);
+        const auto raw = body.first(header_.chunk_count * sizeof(Chunk));
+        if (format::headerHash(header_, raw) != header_.xxh64) return bad("the header or the chunk table is damaged");
+        chunks_.resize(header_.chunk_count);
+        if (!raw.empty()) std::memcpy(chunks_.data(), raw.data(), raw.size());
+        for (const Chunk& c : chunks_) {
+            if (c.offset > file_.size() || c.stored_bytes > file_.size() - c.offset)
+                return bad("chunk {} reaches past the end of the file", name(c));
+            if (c.real_bytes / expansion_max > c.stored_bytes || c.shuffle == 0)
+                return bad("chunk {} has an impossible size", name(c));
+            if (!known(c.type) && !(c.flags & format::chunk_optional))
+                return bad("chunk {} is of a type that this build does not know", name(c));
+        }
+        return {};
+    }
+
+    static bool known(uint32_t type) {
+        switch (static_cast<ChunkType>(type)) {
+            case ChunkType::Elements:
+            case ChunkType::Contributions:
+            case ChunkType::BasePages:
+            case ChunkType::Clusters:
+            case ChunkType::Terms:
+            case ChunkType::Batches:
+            case ChunkType::Addresses:
+            case ChunkType::Payload:
+            case ChunkType::Meshes:
+            case ChunkType::Viewpoints:
+            case ChunkType::Settings:
+                return true;
+        }
+        return false;
+    }
+
+    Expected<const Chunk*> find(ChunkType type, uint32_t subject) const {
+        const Chunk* found = nullptr;
+        for (const Chunk& c : chunks_) {
+            if (c.type != static_cast<uint32_t>(type) || c.subject != subject) continue;
+            if (found) return bad("chunk {} stands there twice", name(c));
+            found = &c;
+        }
+        if (!found) return bad("chunk {} {} is missing", name(type), subject);
+        return found;
+    }
+
+    Expected<std::vector<std::byte>> load(ChunkType type, uint32_t subject) const {
+        const auto chunk = find(type, subject);
+        if (!chunk) return std::unexpected(chunk.error());
+        const Chunk& c = **chunk;
+        const auto stored = file_.subspan(c.offset, c.stored_bytes);
+        if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
+        if (ZSTD_getFrameContentSize(stored.data(), stored.size()) != c.real_bytes)
+            return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
+        std::vector<std::byte> shuffled(c.real_bytes);
+        const size_t got = ZSTD_decompress(shuffled.data(), shuffled.size(), stored.data(), stored.size());
+        if (ZSTD_isError(got) || got != c.real_bytes) return bad("chunk {} cannot be decompressed", name(c));
+        return unshuffle(std::move(shuffled), c.shuffle);
+    }
+
+    static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record) {
+        if (record <= 1 || bytes.size() % record != 0) return bytes;
+        const size_t count = bytes.size() / record;
+        std::vector<std::byte> out(bytes.size());
+        for (size_t b = 0; b < record; ++b)
+            for (size_t i = 0; i < count; ++i) out[i * record + b] = bytes[b * count + i];
+        return out;
+    }
+
+    template <class T>
+    Expected<void> array(ChunkType type, std::vector<T>& out, uint32_t subject = 0) const {
+        auto bytes = load(type, subject);
+        if (!bytes) return std::unexpected(bytes.error());
+        if (bytes->size() % sizeof(T) != 0) return bad("chunk {} ends within a record", name(type));
+        const size_t old = out.size();
+        out.resize(old + bytes->size() / sizeof(T));
+        if (!bytes->empty()) std::memcpy(out.data() + old, bytes->data(), bytes->size());
+        return {};
+    }
+
+    Expected<void> table(ChunkType type, auto&& parse) const {
+        auto bytes = load(type, 0);
+        if (!bytes) return std::unexpected(bytes.error());
+        ByteReader in(*bytes);
+        parse(in);
+        if (!in.atEnd()) return bad("chunk {} is malformed", name(type));
+        return {};
+    }
+
+    Expected<void> readPayload(PackData& d) const {
+        for (uint32_t k = 0; k < d.contributions.size(); ++k) {
+            const size_t before = d.payload.size();
+            if (auto ok = array(ChunkType::Payload, d.payload, k); !ok) return ok;
+            if (d.payload.size() - before != d.contributions[k].receivers)
+                return bad("payload {} holds {} records instead of {}", k, d.payload.size() - before,
+                           d.contributions[k].receivers);
+        }
+        return {};
+    }
+
+    static void readElements(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 12)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            Element e;
+            e.name = in.getString();
+            e.kind = static_cast<ElementKind>(in.get<uint32_t>());
+            e.max_weight = in.get<float>();
+            d.elements.push_back(std::move(e));
+        }
+    }
+
+    static std::optional<uint32_t> optionalIndex(ByteReader& in) {
+        const uint32_t value = in.get<uint32_t>();
+        return value == UINT32_MAX ? std::nullopt : std::optional(value);
+    }
+
+    static void readContributions(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 20)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            Contribution c;
+            c.light_set = optionalIndex(in);
+            c.doors_open = in.getArray<uint32_t>();
+            c.doors_closed = in.getArray<uint32_t>();
+            c.receivers = in.get<uint32_t>();
+            c.energy_dropped = in.get<float>();
+            d.contributions.push_back(std::move(c));
+        }
+    }
+
+    static void readMeshes(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 48)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            Mesh m;
+            m.node = in.getString();
+            m.page = in.get<uint32_t>();
+            m.door = optionalIndex(in);
+            m.reflectance = in.get<std::array<float, 3>>();
+            m.emission_cd_m2 = in.get<std::array<float, 3>>();
+            m.emission_set = optionalIndex(in);
+            m.vertices = in.getArray<MeshVertex>();
+            m.indices = in.getArray<uint32_t>();
+            d.meshes.push_back(std::move(m));
+        }
+    }
+
+    static void readViewpoints(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 32)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            Viewpoint v;
+            v.name = in.getString();
+            v.position_m = in.get<std::array<float, 3>>();
+            v.forward = in.get<std::array<float, 3>>();
+            v.vertical_fov_rad = in.get<float>();
+            d.viewpoints.push_back(std::move(v));
+        }
+    }
+
+    std::span<const std::byte> file_;
+    format::Header header_{};
+    std::vector<Chunk> chunks_;
+};
+
+}  // namespace
+
+Expected<PackData> readPack(std::span<const std::byte> bytes) {
+    return Reader(bytes).read();
+}
+
+}  // namespace dimmer

@@ -1,0 +1,169 @@
+#include <pack/pack_data.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+namespace dimmer {
+namespace {
+
+template <class... Args>
+std::unexpected<Error> bad(fmt::format_string<Args...> text, Args&&... args) {
+    return fail(ErrorCode::BadInput,
+                "the pack is not usable: " + fmt::format(text, std::forward<Args>(args)...) + "; cook it again");
+}
+
+bool finite(std::span<const float> values) {
+    return std::ranges::all_of(values, [](float v) { return std::isfinite(v); });
+}
+
+Expected<void> validatePages(const PackData& d) {
+    if (d.page_count == 0 || d.page_count > page_count_max || d.page_width == 0 || d.page_width > page_side_max ||
+        d.page_height == 0 || d.page_height > page_side_max)
+        return bad("{} pages of {} x {} texels are outside 1..{} pages of 1..{} a side", d.page_count, d.page_width,
+                   d.page_height, page_count_max, page_side_max);
+    const uint64_t texels = uint64_t{d.page_count} * d.page_width * d.page_height;
+    if (d.base_pages.size() != texels)
+        return bad("its base holds {} texels, its pages {}", d.base_pages.size(), texels);
+    if (!std::isfinite(d.exposure) || d.exposure <= 0) return bad("its exposure is {}", d.exposure);
+    return {};
+}
+
+Expected<void> validateElements(const PackData& d) {
+    std::set<std::pair<ElementKind, std::string_view>> names;
+    bool doors = false;
+    for (const Element& e : d.elements) {
+        if (e.kind != ElementKind::LightSet && e.kind != ElementKind::Door)
+            return bad("element '{}' is of an unknown kind", e.name);
+        if (e.kind == ElementKind::Door) doors = true;
+        if (doors && e.kind == ElementKind::LightSet) return bad("light set '{}' stands behind a door", e.name);
+        if (e.name.empty() || !names.emplace(e.kind, e.name).second)
+            return bad("the element name '{}' is empty or used twice", e.name);
+        if (!std::isfinite(e.max_weight) || e.max_weight <= 0)
+            return bad("element '{}' has a largest weight of {}", e.name, e.max_weight);
+    }
+    return {};
+}
+
+Expected<void> validateContributions(const PackData& d) {
+    auto is = [&](uint32_t index, ElementKind kind) {
+        return index < d.elements.size() && d.elements[index].kind == kind;
+    };
+    uint64_t records = 0;
+    for (size_t k = 0; k < d.contributions.size(); ++k) {
+        const Contribution& c = d.contributions[k];
+        if (c.light_set && !is(*c.light_set, ElementKind::LightSet)) return bad("contribution {} has no such set", k);
+        for (const auto* doors : {&c.doors_open, &c.doors_closed})
+            for (uint32_t door : *doors)
+                if (!is(door, ElementKind::Door)) return bad("contribution {} has no such door", k);
+        if (!std::isfinite(c.energy_dropped)) return bad("contribution {} dropped {} energy", k, c.energy_dropped);
+        records += c.receivers;
+    }
+    if (records != d.payload.size())
+        return bad("its contributions list {} records, its payload holds {}", records, d.payload.size());
+    return {};
+}
+
+// Terms of a cluster ascend by contribution, and each contribution's records are handed out in cluster order, so every
+// record is used exactly once.
+Expected<void> validateTerms(const PackData& d) {
+    std::vector<uint64_t> next(d.contributions.size());
+    uint64_t first = 0;
+    for (size_t k = 0; k < next.size(); ++k) {
+        next[k] = first;
+        first += d.contributions[k].receivers;
+    }
+    const std::vector<uint64_t> ends = [&] {
+        std::vector<uint64_t> e(next.size());
+        for (size_t k = 0; k < e.size(); ++k) e[k] = next[k] + d.contributions[k].receivers;
+        return e;
+    }();
+    for (size_t i = 0; i < d.clusters.size(); ++i) {
+        const Cluster& c = d.clusters[i];
+        for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) {
+            const ClusterTerm& term = d.terms[t];
+            if (term.contribution >= next.size()) return bad("cluster {} names contribution {}", i, term.contribution);
+            if (t > c.first_term && d.terms[t - 1].contribution >= term.contribution)
+                return bad("the contributions of cluster {} are out of order", i);
+            if (term.first_record != next[term.contribution]) return bad("cluster {} misplaces its records", i);
+            next[term.contribution] += c.receiver_count;
+            if (next[term.contribution] > ends[term.contribution])
+                return bad("cluster {} reads past contribution {}", i, term.contribution);
+        }
+    }
+    if (next != ends) return bad("some records belong to no cluster");
+    return {};
+}
+
+Expected<void> validateClusters(const PackData& d) {
+    uint64_t receiver = 0, batch = 0, term = 0;
+    for (size_t i = 0; i < d.clusters.size(); ++i) {
+        const Cluster& c = d.clusters[i];
+        if (c.first_receiver != receiver || c.first_batch != batch || c.first_term != term || c.receiver_count == 0)
+            return bad("cluster {} does not follow the one before it", i);
+        receiver += c.receiver_count;
+        batch += c.batch_count;
+        term += c.term_count;
+        if (receiver > d.addresses.size() || batch > d.batches.size() || term > d.terms.size())
+            return bad("cluster {} reaches past the tables", i);
+        uint64_t covered = c.first_receiver;
+        for (uint64_t b = c.first_batch; b < batch; ++b) {
+            const Batch& item = d.batches[b];
+            if (item.first_receiver != covered || item.receiver_count == 0 || item.receiver_count > batch_receivers_max)
+                return bad("batch {} does not follow the one before it", b);
+            covered += item.receiver_count;
+        }
+        if (covered != receiver) return bad("the batches of cluster {} do not cover it", i);
+    }
+    if (receiver != d.addresses.size() || batch != d.batches.size() || term != d.terms.size())
+        return bad("its clusters do not cover its tables");
+    return {};
+}
+
+Expected<void> validateAddresses(const PackData& d) {
+    std::vector<bool> taken(d.base_pages.size());
+    for (uint32_t address : d.addresses) {
+        const uint32_t page = TexelAddress::page(address), x = TexelAddress::x(address), y = TexelAddress::y(address);
+        if (page >= d.page_count || x >= d.page_width || y >= d.page_height)
+            return bad("a receiver lies outside the pages, at page {} ({}, {})", page, x, y);
+        const size_t texel = (size_t{page} * d.page_height + y) * d.page_width + x;
+        if (taken[texel]) return bad("two receivers share the texel ({}, {}) of page {}", x, y, page);
+        taken[texel] = true;
+    }
+    return {};
+}
+
+Expected<void> validateMeshes(const PackData& d) {
+    auto in = [&](std::optional<uint32_t> element, ElementKind kind) {
+        return !element || (*element < d.elements.size() && d.elements[*element].kind == kind);
+    };
+    for (const Mesh& m : d.meshes) {
+        if (m.page >= d.page_count) return bad("mesh '{}' lies on page {}", m.node, m.page);
+        if (!in(m.door, ElementKind::Door) || !in(m.emission_set, ElementKind::LightSet))
+            return bad("mesh '{}' belongs to no such element", m.node);
+        if (m.indices.size() % 3 != 0) return bad("mesh '{}' has a broken triangle", m.node);
+        if (!std::ranges::all_of(m.indices, [&](uint32_t i) { return i < m.vertices.size(); }))
+            return bad("mesh '{}' has an index past its vertices", m.node);
+        if (!finite(m.reflectance) || !finite(m.emission_cd_m2)) return bad("mesh '{}' has no finite colour", m.node);
+        for (const MeshVertex& v : m.vertices)
+            if (!finite(v.position_m) || !finite(v.normal) || !finite(v.lightmap_uv))
+                return bad("mesh '{}' has a vertex that is not finite", m.node);
+    }
+    for (const Viewpoint& v : d.viewpoints)
+        if (!finite(v.position_m) || !finite(v.forward) || !std::isfinite(v.vertical_fov_rad))
+            return bad("viewpoint '{}' is not finite", v.name);
+    return {};
+}
+
+}  // namespace
+
+Expected<void> validate(const PackData& data) {
+    for (auto* check : {validatePages, validateElements, validateContributions, validateClusters, validateTerms,
+                        validateAddresses, validateMeshes})
+        if (auto ok = check(data); !ok) return ok;
+    return {};
+}
+
+}  // namespace dimmer

@@ -1,0 +1,156 @@
+#include <dimmer/light_state.h>
+
+#include <fmt/format.h>
+#include <update/planner.h>
+#include <update/state_text.h>
+
+#include <cmath>
+#include <optional>
+
+namespace dimmer {
+namespace {
+
+std::optional<uint32_t> findElement(std::span<const Element> elements, ElementKind kind, std::string_view name) {
+    for (uint32_t i = 0; i < elements.size(); ++i)
+        if (elements[i].kind == kind && elements[i].name == name) return i;
+    return std::nullopt;
+}
+
+std::string_view kindName(ElementKind kind) {
+    return kind == ElementKind::Door ? "door" : "light set";
+}
+
+Error unknownName(std::span<const Element> elements, ElementKind kind, std::string_view name) {
+    std::vector<std::string_view> names;
+    for (const Element& element : elements)
+        if (element.kind == kind) names.push_back(element.name);
+    const auto other = kind == ElementKind::Door ? ElementKind::LightSet : ElementKind::Door;
+    std::string message = fmt::format("The pack has no {} \"{}\".", kindName(kind), name);
+    if (names.empty())
+        message += fmt::format(" It has no {} at all.", kindName(kind));
+    else if (const auto nearest = nearestName(name, names); !nearest.empty())
+        message += fmt::format(" Did you mean \"{}\"?", nearest);
+    if (findElement(elements, other, name))
+        message += fmt::format(" There is a {} of that name{}.", kindName(other),
+                               other == ElementKind::Door ? fmt::format(": \"door:{}\" in a state", name) : "");
+    return {ErrorCode::NotFound, std::move(message)};
+}
+
+Expected<uint32_t> lookUp(std::span<const Element> elements, ElementKind kind, std::string_view name) {
+    if (const auto index = findElement(elements, kind, name)) return *index;
+    return std::unexpected(unknownName(elements, kind, name));
+}
+
+Expected<void> checkHandle(std::span<const Element> elements, ElementKind kind, uint32_t index) {
+    if (index < elements.size() && elements[index].kind == kind) return {};
+    return fail(ErrorCode::InvalidArgument,
+                fmt::format("Element {} is no {} of this pack; handles come from a look-up on a runtime of the same "
+                            "pack.",
+                            index, kindName(kind)));
+}
+
+bool inRange(float value, float max) {
+    return value >= 0 && value <= max;
+}  // false for NaN
+
+Expected<void> checkWeight(const Element& set, const Weight& weight) {
+    if (inRange(weight.r, set.max_weight) && inRange(weight.g, set.max_weight) && inRange(weight.b, set.max_weight))
+        return {};
+    return fail(ErrorCode::InvalidArgument,
+                fmt::format("Light set \"{}\": the weight {}/{}/{} is not within 0..{}, the level's dimmer_max_weight.",
+                            set.name, weight.r, weight.g, weight.b, set.max_weight));
+}
+
+Expected<void> checkOpen(const Element& door, float open) {
+    if (inRange(open, 1)) return {};
+    return fail(ErrorCode::InvalidArgument,
+                fmt::format("Door \"{}\": {} is not within 0 (closed)..1 (open).", door.name, open));
+}
+
+// Adding 0 turns -0 into 0, so that equal weights have equal bits.
+Weight normalised(const Weight& w) {
+    return {w.r + 0.0f, w.g + 0.0f, w.b + 0.0f};
+}
+
+struct ElementChange {
+    uint32_t element;
+    Weight weight;
+};
+
+Expected<void> resolve(std::span<const Element> elements, const StateAssignment& assignment,
+                       std::vector<ElementChange>& changes) {
+    const bool is_door = assignment.target == StateAssignment::Target::Door;
+    const auto index = lookUp(elements, is_door ? ElementKind::Door : ElementKind::LightSet, assignment.name);
+    if (!index) return std::unexpected(index.error());
+    const Element& element = elements[*index];
+    if (auto ok = is_door ? checkOpen(element, assignment.value.r) : checkWeight(element, assignment.value); !ok)
+        return ok;
+    changes.push_back({*index, assignment.value});
+    return {};
+}
+
+}  // namespace
+
+LightState::LightState(const Pack& pack) : pack_(pack), planner_(std::make_unique<Planner>(pack_.data())) {}
+LightState::~LightState() = default;
+LightState::LightState(LightState&&) noexcept = default;
+LightState& LightState::operator=(LightState&&) noexcept = default;
+
+Expected<LightSet> LightState::lightSet(std::string_view name) const {
+    const auto index = lookUp(pack_.elements(), ElementKind::LightSet, name);
+    if (!index) return std::unexpected(index.error());
+    return LightSet{*index};
+}
+
+Expected<Door> LightState::door(std::string_view name) const {
+    const auto index = lookUp(pack_.elements(), ElementKind::Door, name);
+    if (!index) return std::unexpected(index.error());
+    return Door{*index};
+}
+
+Expected<void> LightState::setWeight(LightSet set, Weight weight) {
+    if (auto ok = checkHandle(pack_.elements(), ElementKind::LightSet, set.element); !ok) return ok;
+    if (auto ok = checkWeight(pack_.elements()[set.element], weight); !ok) return ok;
+    planner_->setElement(set.element, normalised(weight));
+    return {};
+}
+
+Expected<void> LightState::setDoor(Door door, float open) {
+    if (auto ok = checkHandle(pack_.elements(), ElementKind::Door, door.element); !ok) return ok;
+    if (auto ok = checkOpen(pack_.elements()[door.element], open); !ok) return ok;
+    planner_->setElement(door.element, normalised(Weight(open)));
+    return {};
+}
+
+Expected<void> LightState::apply(std::string_view state) {
+    const auto assignments = parseState(state);
+    if (!assignments) return std::unexpected(assignments.error());
+
+    const auto elements = pack_.elements();
+    std::vector<ElementChange> changes;
+    for (const StateAssignment& assignment : *assignments) {
+        if (assignment.target != StateAssignment::Target::AllSets) continue;
+        for (uint32_t i = 0; i < elements.size(); ++i) {
+            if (elements[i].kind != ElementKind::LightSet) continue;
+            if (auto ok = checkWeight(elements[i], assignment.value); !ok) return ok;
+            changes.push_back({i, assignment.value});
+        }
+    }
+    for (const StateAssignment& assignment : *assignments) {
+        if (assignment.target == StateAssignment::Target::AllSets) continue;
+        if (auto ok = resolve(elements, assignment, changes); !ok) return ok;
+    }
+    for (const ElementChange& change : changes) planner_->setElement(change.element, normalised(change.weight));
+    return {};
+}
+
+// A handle of another pack has no weight here; 0 is the harmless answer.
+Weight LightState::weight(LightSet set) const {
+    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner_->element(set.element) : 0.0f;
+}
+
+float LightState::open(Door door) const {
+    return checkHandle(pack_.elements(), ElementKind::Door, door.element) ? planner_->element(door.element).r : 0.0f;
+}
+
+}  // namespace dimmer

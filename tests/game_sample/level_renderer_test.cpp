@@ -1,0 +1,139 @@
+// Radiance of a wall that fills the view, against its closed form: reflectance * irradiance / pi + emission * weight.
+#include <format/texel.h>
+#include <game_sample/level_renderer.h>
+#include <game_sample/player.h>
+#include <gpu/headless_device.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <glm/gtc/packing.hpp>
+#include <numbers>
+
+namespace dimmer::sample {
+namespace {
+
+constexpr float irradiance_lux = 48, exposure = 0.25f;  // 12 as stored: exact in 11 and 10 bits
+
+// A wall at z = -2 that faces +Z (or, mirrored, away), lit with 48 lux by "lamp" alone.
+PackData wall(bool faces_viewer) {
+    PackData data;
+    data.exposure = exposure;
+    data.page_width = data.page_height = 8;
+    data.page_count = 1;
+    data.base_pages.resize(64, {0, encodeDirection(0, 0, 0, 0)});
+    data.elements = {{"lamp", ElementKind::LightSet, 1}};
+    Contribution lamp;
+    lamp.light_set = 0;
+    lamp.receivers = 64;
+    data.contributions = {lamp};
+    data.clusters = {{0, 64, 0, 1, 0, 1}};
+    data.terms = {{0, 0}};
+    data.batches = {{0, 64}};
+    constexpr float stored = irradiance_lux * exposure;
+    for (uint32_t i = 0; i < 64; ++i) {
+        data.addresses.push_back(TexelAddress::pack(0, i % 8, i / 8));
+        data.payload.push_back({encodeR11G11B10(stored, stored, stored), encodeDirection(1, 1, 0, 0)});
+    }
+    Mesh mesh;
+    mesh.node = "wall";
+    mesh.reflectance = {0.5f, 0.25f, 0.75f};
+    mesh.emission_cd_m2 = {0, 8, 0};
+    mesh.emission_set = 0;
+    const float z = faces_viewer ? 1.0f : -1.0f;
+    mesh.vertices = {{{-9, -9, -2}, {0, 0, z}, {0, 0}},
+                     {{9, -9, -2}, {0, 0, z}, {1, 0}},
+                     {{9, 9, -2}, {0, 0, z}, {1, 1}},
+                     {{-9, 9, -2}, {0, 0, z}, {0, 1}}};
+    if (faces_viewer)
+        mesh.indices = {0, 1, 2, 0, 2, 3};
+    else
+        mesh.indices = {0, 2, 1, 0, 3, 2};
+    data.meshes = {mesh};
+    return data;
+}
+
+// One frame seen from the origin along -Z, with `weight` on the lamp.
+glm::vec3 middlePixel(const PackData& data, Weight weight) {
+    const auto pack = Pack::fromData(data);
+    EXPECT_TRUE(pack);
+    const auto device = HeadlessDevice::create({.validation = true, .graphics = true});
+    EXPECT_TRUE(device) << device.error().message;
+    const VulkanContext vulkan = device->context();
+    glm::vec3 middle{-1};
+    {
+        auto lights = Runtime::create(vulkan, *pack);
+        EXPECT_TRUE(lights && lights->setWeight(*lights->lightSet("lamp"), weight));
+        auto renderer = LevelRenderer::create(vulkan, *pack, lights->images(), {16, 8});
+        EXPECT_TRUE(renderer);
+
+        VkCommandPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, vulkan.queue_family};
+        VkCommandPool pool = VK_NULL_HANDLE;
+        vkCreateCommandPool(vulkan.device, &pool_info, nullptr, &pool);
+        VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr, pool,
+                                             VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
+        VkCommandBuffer commands = VK_NULL_HANDLE;
+        vkAllocateCommandBuffers(vulkan.device, &allocate, &commands);
+        VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
+        vkBeginCommandBuffer(commands, &begin);
+        EXPECT_TRUE(lights->record(commands));
+        renderer->record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, *lights);
+        vkEndCommandBuffer(commands);
+        VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO, nullptr, 0, nullptr, nullptr, 1, &commands, 0, nullptr};
+        vkQueueSubmit(vulkan.queue, 1, &submit, VK_NULL_HANDLE);
+        vkQueueWaitIdle(vulkan.queue);
+
+        const RadianceFrame frame = renderer->read();
+        const uint16_t* pixel = &frame.rgba[(4 * 16 + 8) * 4];
+        middle = {glm::unpackHalf1x16(pixel[0]), glm::unpackHalf1x16(pixel[1]), glm::unpackHalf1x16(pixel[2])};
+        vkDestroyCommandPool(vulkan.device, pool, nullptr);
+    }
+    for (const std::string& message : device->validationMessages()) ADD_FAILURE() << message;
+    return middle;
+}
+
+// Half floats hold 11 bits: a relative error of 2^-11.
+void expectRadiance(const glm::vec3& pixel, const glm::vec3& expected) {
+    for (int channel = 0; channel < 3; ++channel)
+        EXPECT_NEAR(pixel[channel], expected[channel], expected[channel] * 0x1p-10f) << channel;
+}
+
+TEST(SampleLevelRenderer, RadianceIsReflectedAndEmittedLight) {
+    constexpr float e_pi = irradiance_lux / std::numbers::pi_v<float>;
+    expectRadiance(middlePixel(wall(true), 1), {0.5f * e_pi, 0.25f * e_pi + 8, 0.75f * e_pi});
+}
+
+TEST(SampleLevelRenderer, EmissionFollowsItsSet) {
+    constexpr float e_pi = irradiance_lux / std::numbers::pi_v<float>;
+    expectRadiance(middlePixel(wall(true), Weight(1, 0.5f, 0)), {0.5f * e_pi, 0.5f * (0.25f * e_pi + 8), 0});
+}
+
+TEST(SampleLevelRenderer, BackFacesShowWhatIsBehind) {
+    expectRadiance(middlePixel(wall(false), 1), {3, 2, 1});
+}
+
+TEST(SamplePlayer, WritesPicturesAndCosts) {
+    const auto pack = Pack::fromData(wall(true));
+    ASSERT_TRUE(pack);
+    const auto script = parseScript("size 16 8\nframes 4\ncamera 0 0 0 look 0 0 -1\nat 2 set lamp=0.5", "test", *pack);
+    ASSERT_TRUE(script) << script.error().message;
+    const auto out = std::filesystem::path(testing::TempDir()) / "dimmer_sample_player";
+    std::filesystem::remove_all(out);
+    const auto played = playHeadless(*pack, *script, {"wall.dimmer", out, true});
+    ASSERT_TRUE(played) << played.error().message;
+    EXPECT_TRUE(played->validation_messages.empty()) << played->validation_messages.front();
+
+    for (const char* name : {"frame_0000.png", "frame_0003.png", "cost.json"})
+        EXPECT_GT(std::filesystem::file_size(out / name), 0u) << name;
+    const auto events = played->cost.events();
+    ASSERT_FALSE(events.empty());
+    EXPECT_EQ(events.back().first_frame, 2u);
+    EXPECT_EQ(events.back().what, "set lamp=0.5");
+    EXPECT_EQ(events.back().median.receivers, 64u);
+    EXPECT_EQ(events.back().median.batches, 1u);
+    EXPECT_EQ(played->cost.idleMedian().dispatches, 0u);
+    EXPECT_GE(played->cost.idleFrames(), 2u);
+    std::filesystem::remove_all(out);
+}
+
+}  // namespace
+}  // namespace dimmer::sample

@@ -1,0 +1,111 @@
+#include <dimmer/cpu_runtime.h>
+#include <game_sample/timeline.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <pack/pack_data.h>
+
+#include <set>
+
+namespace dimmer::sample {
+namespace {
+
+class TimelineTest : public ::testing::Test {
+   protected:
+    static Pack makePack() {
+        PackData data;
+        data.page_width = data.page_height = 8;
+        data.page_count = 1;
+        data.base_pages.resize(64);
+        data.elements = {{"hall", ElementKind::LightSet, 1}, {"front", ElementKind::Door, 1}};
+        return *Pack::fromData(std::move(data));
+    }
+
+    // Plays frames 0..`last`; `seen(frame)` after each.
+    template <class Seen>
+    void play(std::string_view text, uint32_t last, Seen seen) {
+        const auto script = parseScript(text, "test", pack_);
+        ASSERT_TRUE(script) << script.error().message;
+        Timeline timeline(*script);
+        for (uint32_t frame = 0; frame <= last; ++frame) {
+            const auto changes = timeline.advance(frame, lights_);
+            ASSERT_TRUE(changes) << changes.error().message;
+            seen(frame, timeline, *changes);
+        }
+    }
+
+    Weight hall() const { return lights_.weight(*lights_.lightSet("hall")); }
+
+    Pack pack_ = makePack();
+    CpuRuntime lights_{pack_};
+};
+
+TEST_F(TimelineTest, SetTakesEffectInItsFrameAndIsReportedOnce) {
+    play("at 2 set hall=0.25", 4, [&](uint32_t frame, const Timeline&, const auto& changes) {
+        EXPECT_EQ(hall(), Weight(frame < 2 ? 1.0f : 0.25f));
+        EXPECT_EQ(changes.size(), frame == 2 ? 1u : 0u);
+    });
+}
+
+TEST_F(TimelineTest, FadeIsLinearPerChannelAndEndsExactly) {
+    play("at 1 fade hall 1 0/0.5/1 over 4", 7, [&](uint32_t frame, const Timeline&, const auto& changes) {
+        const float t = frame <= 1 ? 0 : frame >= 5 ? 1 : static_cast<float>(frame - 1) / 4;
+        EXPECT_EQ(hall(), Weight(1 - t, 1 - t / 2, 1)) << frame;
+        EXPECT_EQ(changes.size(), frame >= 1 && frame <= 5 ? 1u : 0u) << frame;
+    });
+}
+
+TEST_F(TimelineTest, DoorsFadeToo) {
+    play("at 0 fade door:front 0 1 over 2", 2, [&](uint32_t frame, const Timeline&, const auto&) {
+        EXPECT_EQ(lights_.open(*lights_.door("front")), static_cast<float>(frame) / 2);
+    });
+}
+
+TEST_F(TimelineTest, FlickerStaysWithinItsRangeOfTheWeightAndGivesItBack) {
+    std::set<float> reds;
+    play("at 0 set hall=0.8/0.4/0\nat 1 flicker hall 0.25 0.75 for 20 seed 3", 25,
+         [&](uint32_t frame, const Timeline&, const auto&) {
+             if (frame == 0 || frame > 20) {
+                 EXPECT_EQ(hall(), Weight(0.8f, 0.4f, 0));
+                 return;
+             }
+             EXPECT_GE(hall().r, 0.8f * 0.25f);
+             EXPECT_LE(hall().r, 0.8f * 0.75f);
+             EXPECT_FLOAT_EQ(hall().g, hall().r / 2);
+             EXPECT_EQ(hall().b, 0);
+             reds.insert(hall().r);
+         });
+    EXPECT_GT(reds.size(), 15u);
+}
+
+TEST_F(TimelineTest, FlickerNoiseIsUniformAndDependsOnItsSeed) {
+    double sum = 0;
+    int differing = 0;
+    for (uint32_t frame = 0; frame < 4096; ++frame) {
+        const float noise = flickerNoise(7, frame);
+        ASSERT_GE(noise, 0);
+        ASSERT_LT(noise, 1);
+        sum += noise;
+        differing += noise != flickerNoise(8, frame);
+    }
+    // The mean of 4096 uniform numbers has a standard deviation of 1 / sqrt(12 * 4096) = 0.0045.
+    EXPECT_NEAR(sum / 4096, 0.5, 5 * 0.0045);
+    EXPECT_GT(differing, 4000);
+}
+
+TEST_F(TimelineTest, CamerasCutAndMove) {
+    std::vector<float> xs;
+    CameraPose last;
+    play("camera 0 0 0 look 1 0 0\nat 1 move 8 0 0 look 9 0 0 over 4\nat 7 camera 3 3 3 look 3 4 3", 8,
+         [&](uint32_t frame, const Timeline& timeline, const auto&) {
+             xs.push_back(timeline.camera().position_m.x);
+             last = timeline.camera();
+             EXPECT_EQ(timeline.cut(), frame == 7);
+         });
+    // 8 (3t^2 - 2t^3) at t = 0, 1/4, 1/2, 3/4, 1
+    EXPECT_THAT(xs,
+                testing::Pointwise(testing::FloatNear(1e-5f), std::vector<float>{0, 0, 1.25f, 4, 6.75f, 8, 8, 3, 3}));
+    EXPECT_EQ(last.forward, glm::vec3(0, 1, 0));
+}
+
+}  // namespace
+}  // namespace dimmer::sample

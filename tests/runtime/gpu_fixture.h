@@ -1,0 +1,45 @@
+// A Vulkan device with validation for tests. Any message of the layers fails the test during which it came.
+#pragma once
+
+#include <gpu/headless_device.h>
+#include <gtest/gtest.h>
+
+#include <optional>
+
+namespace dimmer::test {
+
+class GpuTest : public testing::Test {
+   protected:
+    static void SetUpTestSuite() {
+        if (auto made = HeadlessDevice::create({.validation = true}))
+            device_ = std::move(*made);
+        else
+            problem_ = made.error().message;
+    }
+    static void TearDownTestSuite() { device_.reset(); }
+
+    void SetUp() override {
+        if (device_) {
+            messages_before_ = device_->validationMessages().size();
+            return;
+        }
+        // No device at all is this machine's business; a device without the validation layer is not enough.
+        if (!HeadlessDevice::create()) GTEST_SKIP() << "no Vulkan device: " << problem_;
+        FAIL() << problem_;
+    }
+
+    void TearDown() override {
+        if (!device_) return;
+        const auto messages = device_->validationMessages();
+        for (size_t i = messages_before_; i < messages.size(); ++i) ADD_FAILURE() << messages[i];
+    }
+
+    static const HeadlessDevice& device() { return *device_; }
+
+   private:
+    static inline std::optional<HeadlessDevice> device_;
+    static inline std::string problem_;
+    size_t messages_before_ = 0;
+};
+
+}  // namespace dimmer::test

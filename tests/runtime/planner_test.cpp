@@ -1,0 +1,186 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <update/planner.h>
+
+#include "random_pack.h"
+
+#include <map>
+#include <set>
+
+namespace dimmer {
+namespace {
+
+// The records that a work list reads at each receiver, as indices into the payload.
+std::map<uint32_t, std::vector<uint32_t>> recordsRead(const WorkList& work) {
+    std::map<uint32_t, std::vector<uint32_t>> reads;
+    for (const WorkItem& item : work.items) {
+        for (uint32_t i = item.first_receiver; i < item.first_receiver + item.receiver_count; ++i) {
+            EXPECT_FALSE(reads.contains(i)) << "receiver " << i << " is written twice";
+            auto& records = reads[i];
+            for (uint32_t t = 0; t < item.term_count; ++t)
+                records.push_back(work.terms[item.first_term + t].payload_bias + i);
+        }
+    }
+    return reads;
+}
+
+// The same from the pack: clusters that hold a contribution of `changed`, records of contributions of `on`.
+std::map<uint32_t, std::vector<uint32_t>> recordsExpected(const PackData& data, const std::set<uint32_t>& changed,
+                                                          const std::set<uint32_t>& on) {
+    std::map<uint32_t, std::vector<uint32_t>> reads;
+    for (const Cluster& c : data.clusters) {
+        const auto terms = std::span(data.terms).subspan(c.first_term, c.term_count);
+        if (std::none_of(terms.begin(), terms.end(), [&](auto& t) { return changed.contains(t.contribution); }))
+            continue;
+        for (uint32_t i = 0; i < c.receiver_count; ++i) {
+            auto& records = reads[c.first_receiver + i];
+            for (const ClusterTerm& term : terms)
+                if (on.contains(term.contribution)) records.push_back(term.first_record + i);
+        }
+    }
+    return reads;
+}
+
+// A pack whose contribution k belongs to set k alone.
+PackData setsOnly(uint32_t seed) {
+    return test::randomPack(seed, {.sets = 14, .doors = 0});
+}
+
+std::set<uint32_t> allOf(const PackData& data) {
+    std::set<uint32_t> all;
+    for (uint32_t k = 0; k < data.contributions.size(); ++k) all.insert(k);
+    return all;
+}
+
+TEST(Planner, TheFirstPlanCoversWhatIsOn) {
+    const PackData data = setsOnly(1);
+    Planner planner(data);
+    ASSERT_TRUE(planner.plan());
+    EXPECT_EQ(recordsRead(planner.work()), recordsExpected(data, allOf(data), allOf(data)));
+}
+
+TEST(Planner, WithEverythingOffAtTheStartPagesHoldTheBaseAlready) {
+    const PackData data = setsOnly(1);
+    Planner planner(data);
+    for (uint32_t i = 0; i < data.elements.size(); ++i) planner.setElement(i, 0);
+    EXPECT_FALSE(planner.plan());
+    EXPECT_TRUE(planner.work().items.empty());
+}
+
+TEST(Planner, NothingChangedIsNoWork) {
+    const PackData data = setsOnly(2);
+    Planner planner(data);
+    planner.plan();
+    EXPECT_FALSE(planner.plan());
+    planner.setElement(3, 1);  // as it was
+    EXPECT_FALSE(planner.plan());
+    planner.setElement(3, 0.5f);
+    planner.setElement(3, 1);  // and back again
+    EXPECT_FALSE(planner.plan());
+    EXPECT_EQ(planner.stats().contributions_changed, 0u);
+    EXPECT_EQ(planner.stats().batches, 0u);
+}
+
+TEST(Planner, OneSetToggledReadsOnlyWhatIsOnWhereItIsHeld) {
+    const PackData data = setsOnly(3);
+    Planner planner(data);
+    planner.plan();
+    std::set<uint32_t> on = allOf(data);
+    for (uint32_t k = 0; k < data.contributions.size(); ++k) {
+        planner.setElement(k, 0);
+        on.erase(k);
+        ASSERT_TRUE(planner.plan());
+        // An off set's records are not among those read, nor are those of clusters without it.
+        EXPECT_EQ(recordsRead(planner.work()), recordsExpected(data, {k}, on));
+        EXPECT_EQ(planner.stats().contributions_changed, 1u);
+    }
+}
+
+TEST(Planner, CountsAreThoseOfTheClusters) {
+    const PackData data = setsOnly(4);
+    Planner planner(data);
+    planner.plan();
+    planner.setElement(5, 0.5f);
+    ASSERT_TRUE(planner.plan());
+    UpdateStats expected;
+    for (const Cluster& c : data.clusters) {
+        const auto terms = std::span(data.terms).subspan(c.first_term, c.term_count);
+        if (std::none_of(terms.begin(), terms.end(), [](auto& t) { return t.contribution == 5; })) continue;
+        ++expected.clusters;
+        expected.batches += (c.receiver_count + 63) / 64;
+        expected.receivers += c.receiver_count;
+        expected.bytes_read += uint64_t{c.receiver_count} * (4 + 8 + 8 * c.term_count);
+        expected.bytes_written += uint64_t{c.receiver_count} * 8;
+    }
+    ASSERT_GT(expected.clusters, 0u);
+    EXPECT_EQ(planner.stats().clusters, expected.clusters);
+    EXPECT_EQ(planner.stats().batches, expected.batches);
+    EXPECT_EQ(planner.stats().receivers, expected.receivers);
+    EXPECT_EQ(planner.stats().bytes_read, expected.bytes_read);
+    EXPECT_EQ(planner.stats().bytes_written, expected.bytes_written);
+}
+
+TEST(Planner, ItemsAreGroupedByTheNumberOfTermsThatAreOn) {
+    const PackData data = setsOnly(5);
+    Planner planner(data);
+    planner.plan();
+    uint32_t items = 0;
+    for (uint32_t g = 0; g < work_group_count; ++g) {
+        const WorkGroup group = planner.work().groups[g];
+        EXPECT_EQ(group.first_item, items);
+        items += group.item_count;
+        for (const WorkItem& item : planner.work().items.subspan(group.first_item, group.item_count))
+            EXPECT_EQ(g, std::min(item.term_count, 9u));
+    }
+    EXPECT_EQ(items, planner.work().items.size());
+    EXPECT_GT(planner.work().groups[9].item_count, 0u) << "the pack should have clusters of more than 8";
+}
+
+// w = dim * product of open * product of (1 - open), per channel.
+TEST(Planner, WeightsAreProducts) {
+    PackData data = test::emptyPack(1, 2);
+    data.contributions = {
+        {0u, {}, {}, 0, 0}, {0u, {1}, {2}, 0, 0}, {std::nullopt, {}, {1}, 0, 0}, {0u, {1, 2}, {}, 0, 0}};
+    data.page_count = 1;
+    data.page_width = data.page_height = 8;
+    test::Random random(1);
+    const test::ClusterPlan plans[] = {{{0, 1, 2, 3}, 5}};
+    test::fillPack(data, plans, random);
+
+    Planner planner(data);
+    planner.setElement(0, Weight(1, 0.5f, 0.25f));
+    planner.setElement(1, 0.5f);
+    planner.setElement(2, 0.75f);
+    ASSERT_TRUE(planner.plan());
+    ASSERT_EQ(planner.work().terms.size(), 4u);
+    const float doors[] = {1, 0.5f * 0.25f, 0.5f, 0.5f * 0.75f};
+    for (int i = 0; i < 4; ++i) {
+        const Weight dim = i == 2 ? Weight(1) : Weight(1, 0.5f, 0.25f);
+        const WorkTerm& term = planner.work().terms[static_cast<size_t>(i)];
+        EXPECT_EQ(Weight(term.weight_r, term.weight_g, term.weight_b),
+                  Weight(dim.r * doors[i], dim.g * doors[i], dim.b * doors[i]));
+    }
+}
+
+TEST(Planner, AfterARollbackTheNextPlanRepeatsTheWork) {
+    const PackData data = setsOnly(6);
+    Planner planner(data);
+    planner.plan();
+    planner.setElement(2, 0.5f);
+    ASSERT_TRUE(planner.plan());
+    const auto lost = recordsRead(planner.work());
+    planner.rollback();
+    EXPECT_TRUE(planner.work().items.empty());
+    ASSERT_TRUE(planner.plan());
+    EXPECT_EQ(recordsRead(planner.work()), lost);
+
+    // Back to what the pages really hold: nothing to do.
+    planner.setElement(2, 0.25f);
+    ASSERT_TRUE(planner.plan());
+    planner.rollback();
+    planner.setElement(2, 0.5f);
+    EXPECT_FALSE(planner.plan());
+}
+
+}  // namespace
+}  // namespace dimmer

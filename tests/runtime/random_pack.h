@@ -1,0 +1,175 @@
+// Packs with random records, for tests: seeded, so that a failure can be repeated.
+#pragma once
+
+#include <fmt/format.h>
+#include <pack/pack_data.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace dimmer::test {
+
+using Random = std::mt19937;
+
+inline float uniform(Random& random, float low, float high) {
+    return low + (high - low) * (static_cast<float>(random() >> 8) * 0x1p-24f);
+}
+// In low..high, both included.
+inline uint32_t pick(Random& random, uint32_t low, uint32_t high) {
+    return low + static_cast<uint32_t>(random()) % (high - low + 1);
+}
+
+// Unsigned float code of a positive number, rounded down; written from the format's definition.
+inline uint32_t floorUfloatCode(double value, int mantissa_bits) {
+    int exponent = 0;
+    const double fraction = std::frexp(value, &exponent);  // value = fraction * 2^exponent, fraction in [0.5, 1)
+    const double scale = std::ldexp(1.0, mantissa_bits);
+    if (exponent - 1 < -14) return static_cast<uint32_t>(value * std::ldexp(scale, 14));
+    const auto mantissa = static_cast<uint32_t>((fraction * 2 - 1) * scale);
+    return static_cast<uint32_t>(exponent - 1 + 15) << mantissa_bits | mantissa;
+}
+
+// 1e-3..1e5 lux per channel, evenly over the decades; now and then black.
+inline uint32_t randomIrradiance(Random& random, float exposure) {
+    auto stored = [&] { return std::pow(10.0, uniform(random, -3, 5)) * exposure; };
+    if (pick(random, 0, 30) == 0) return 0;
+    return floorUfloatCode(stored(), 6) | floorUfloatCode(stored(), 6) << 11 | floorUfloatCode(stored(), 5) << 22;
+}
+
+// Any ambient share, and a highlight that may point along the surface or past what the share allows.
+inline uint32_t randomDirection(Random& random) {
+    return pick(random, 0, 255) | pick(random, 1, 255) << 8 | pick(random, 1, 255) << 16;
+}
+
+inline TexelRecord randomRecord(Random& random, float exposure) {
+    return {randomIrradiance(random, exposure), randomDirection(random)};
+}
+
+// A cluster to build: which contributions and how many receivers.
+struct ClusterPlan {
+    std::vector<uint32_t> contributions;  // ascending
+    uint32_t receivers = 0;
+};
+
+// Fills everything that follows from elements, contributions, pages and the plans: base, addresses in random order,
+// batches, terms, and records.
+inline void fillPack(PackData& data, std::span<const ClusterPlan> plans, Random& random,
+                     uint32_t batch_size = batch_receivers_max) {
+    data.base_pages.resize(size_t{data.page_count} * data.page_width * data.page_height);
+    for (TexelRecord& record : data.base_pages) record = randomRecord(random, data.exposure);
+
+    std::vector<uint32_t> texels(data.base_pages.size());
+    std::iota(texels.begin(), texels.end(), 0u);
+    for (size_t i = texels.size(); i > 1; --i) std::swap(texels[i - 1], texels[random() % i]);
+
+    for (const ClusterPlan& plan : plans) {
+        Cluster cluster;
+        cluster.first_receiver = static_cast<uint32_t>(data.addresses.size());
+        cluster.receiver_count = plan.receivers;
+        cluster.first_batch = static_cast<uint32_t>(data.batches.size());
+        cluster.first_term = static_cast<uint32_t>(data.terms.size());
+        cluster.term_count = static_cast<uint32_t>(plan.contributions.size());
+        for (uint32_t done = 0; done < plan.receivers; done += batch_size)
+            data.batches.push_back({cluster.first_receiver + done, std::min(batch_size, plan.receivers - done)});
+        cluster.batch_count = static_cast<uint32_t>(data.batches.size()) - cluster.first_batch;
+        for (uint32_t i = 0; i < plan.receivers; ++i) {
+            const uint32_t texel = texels[data.addresses.size()];
+            const uint32_t in_page = texel % (data.page_width * data.page_height);
+            data.addresses.push_back(TexelAddress::pack(texel / (data.page_width * data.page_height),
+                                                        in_page % data.page_width, in_page / data.page_width));
+        }
+        for (uint32_t k : plan.contributions) {
+            data.terms.push_back({k, data.contributions[k].receivers});  // within the contribution, for now
+            data.contributions[k].receivers += plan.receivers;
+        }
+        data.clusters.push_back(cluster);
+    }
+
+    std::vector<uint32_t> first(data.contributions.size() + 1, 0);
+    for (size_t k = 0; k < data.contributions.size(); ++k) first[k + 1] = first[k] + data.contributions[k].receivers;
+    for (ClusterTerm& term : data.terms) term.first_record += first[term.contribution];
+    data.payload.resize(first.back());
+    for (TexelRecord& record : data.payload) record = randomRecord(random, data.exposure);
+}
+
+// Light sets "set0".. and doors "door0"..; for every set a contribution, and some through open, off closed and through
+// two doors; sets 0 and 1 accept weights up to 2.
+inline PackData emptyPack(uint32_t sets, uint32_t doors) {
+    PackData data;
+    // 1e5 lux on a dozen contributions at weight 2 stays finite: 24e5 / 64 = 37500 < 64512.
+    data.exposure = 1.0f / 64;
+    for (uint32_t i = 0; i < sets; ++i)
+        data.elements.push_back({fmt::format("set{}", i), ElementKind::LightSet, i < 2 ? 2.0f : 1.0f});
+    for (uint32_t i = 0; i < doors; ++i) data.elements.push_back({fmt::format("door{}", i), ElementKind::Door, 1});
+    auto add = [&](std::optional<uint32_t> set, std::vector<uint32_t> open, std::vector<uint32_t> closed) {
+        data.contributions.push_back({set, std::move(open), std::move(closed), 0, 0});
+    };
+    for (uint32_t i = 0; i < sets; ++i) add(i, {}, {});
+    for (uint32_t d = 0; d < doors; ++d) {
+        add(std::nullopt, {sets + d}, {});
+        add(std::nullopt, {}, {sets + d});
+        add(d % sets, {sets + d}, {});
+        add((d + 1) % sets, {}, {sets + d});
+    }
+    if (doors >= 2) add(0u, {sets, sets + 1}, {});
+    if (doors >= 2) add(1u, {sets}, {sets + 1});
+    return data;
+}
+
+struct RandomPackOptions {
+    uint32_t sets = 9, doors = 3, clusters = 40;
+    uint32_t overlap_max = 12;
+    uint32_t page_count = 2, page_side = 64;
+};
+
+inline PackData randomPack(uint32_t seed, const RandomPackOptions& options = {}) {
+    Random random(seed);
+    PackData data = emptyPack(options.sets, options.doors);
+    data.page_count = options.page_count;
+    data.page_width = options.page_side;
+    data.page_height = options.page_side;
+
+    const auto contributions = static_cast<uint32_t>(data.contributions.size());
+    std::vector<ClusterPlan> plans(options.clusters);
+    for (uint32_t i = 0; i < options.clusters; ++i) {
+        std::vector<uint32_t> all(contributions);
+        std::iota(all.begin(), all.end(), 0u);
+        for (size_t j = all.size(); j > 1; --j) std::swap(all[j - 1], all[random() % j]);
+        // Every overlap occurs.
+        all.resize(std::min(contributions, 1 + i % options.overlap_max));
+        std::sort(all.begin(), all.end());
+        plans[i] = {std::move(all), pick(random, 1, 150)};
+    }
+    fillPack(data, plans, random);
+    return data;
+}
+
+// A state in text form: each element on, off or in between, scalar or RGB.
+inline std::string randomState(const PackData& data, Random& random) {
+    std::string state;
+    auto number = [&](float max) {
+        switch (pick(random, 0, 3)) {
+            case 0:
+                return 0.0f;
+            case 1:
+                return max;
+            default:
+                return uniform(random, 0, max);
+        }
+    };
+    for (const Element& element : data.elements) {
+        if (pick(random, 0, 2) == 0) continue;
+        const bool door = element.kind == ElementKind::Door;
+        const float max = element.max_weight;
+        state += fmt::format("{}{}{}={}", state.empty() ? "" : ",", door ? "door:" : "", element.name, number(max));
+        if (!door && pick(random, 0, 1)) state += fmt::format("/{}/{}", number(max), number(max));
+    }
+    return state;
+}
+
+}  // namespace dimmer::test

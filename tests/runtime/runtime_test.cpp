@@ -1,0 +1,306 @@
+// The Vulkan runtime, held against the CPU runtime and against itself.
+#include <dimmer/cpu_runtime.h>
+#include <dimmer/runtime.h>
+#include <gmock/gmock.h>
+
+#include "gpu_fixture.h"
+#include "random_pack.h"
+
+namespace dimmer {
+namespace {
+
+Pack packOf(PackData data) {
+    auto pack = Pack::fromData(std::move(data));
+    if (!pack) throw std::runtime_error(pack.error().message);
+    return *pack;
+}
+
+class RuntimeTest : public test::GpuTest {
+   protected:
+    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
+        auto runtime = Runtime::create(device().context(), pack, options);
+        if (!runtime) throw std::runtime_error(runtime.error().message);
+        return std::move(*runtime);
+    }
+    static void expectEqualPages(Runtime& gpu, const CpuRuntime& cpu) {
+        const auto pages = gpu.readPages();
+        ASSERT_TRUE(pages) << pages.error().message;
+        ASSERT_TRUE(std::ranges::equal(pages->irradiance, cpu.irradiancePages()));
+        ASSERT_TRUE(std::ranges::equal(pages->direction, cpu.directionPages()));
+    }
+    static void expectEqualCounts(const UpdateStats& a, const UpdateStats& b) {
+        EXPECT_EQ(a.contributions_changed, b.contributions_changed);
+        EXPECT_EQ(a.clusters, b.clusters);
+        EXPECT_EQ(a.batches, b.batches);
+        EXPECT_EQ(a.receivers, b.receivers);
+        EXPECT_EQ(a.dispatches, b.dispatches);
+        EXPECT_EQ(a.bytes_read, b.bytes_read);
+        EXPECT_EQ(a.bytes_written, b.bytes_written);
+    }
+};
+
+TEST_F(RuntimeTest, StartsWithTheBase) {
+    const Pack pack = packOf(test::randomPack(1));
+    Runtime runtime = runtimeOf(pack);
+    expectEqualPages(runtime, CpuRuntime(pack));
+    const LightmapImages images = runtime.images();
+    EXPECT_EQ(images.layers, pack.pageCount());
+    EXPECT_EQ(images.width, pack.pageWidth());
+}
+
+TEST_F(RuntimeTest, AgreesWithTheCpuBitForBitOverRandomHistories) {
+    for (uint32_t seed = 1; seed <= 3; ++seed) {
+        const Pack pack = packOf(test::randomPack(seed));
+        Runtime gpu = runtimeOf(pack);
+        CpuRuntime cpu(pack);
+        test::Random random(seed);
+        for (int step = 0; step < 15; ++step) {
+            const auto gpu_stats = gpu.submit();
+            ASSERT_TRUE(gpu_stats) << gpu_stats.error().message;
+            expectEqualCounts(*gpu_stats, cpu.update());
+            expectEqualPages(gpu, cpu);
+            if (HasFailure()) FAIL() << "seed " << seed << " step " << step;
+            const std::string state = test::randomState(pack.data(), random);
+            ASSERT_TRUE(gpu.apply(state));
+            ASSERT_TRUE(cpu.apply(state));
+        }
+    }
+}
+
+TEST_F(RuntimeTest, AnyHistoryEndsInTheStateOfAFreshRuntime) {
+    const Pack pack = packOf(test::randomPack(7));
+    Runtime wanderer = runtimeOf(pack);
+    test::Random random(7);
+    for (int step = 0; step < 30; ++step) {
+        ASSERT_TRUE(wanderer.apply(test::randomState(pack.data(), random)));
+        ASSERT_TRUE(wanderer.submit());  // without waiting: the next call has to
+    }
+    Runtime fresh = runtimeOf(pack);
+    for (uint32_t i = 0; i < pack.elements().size(); ++i) {
+        if (pack.elements()[i].kind == ElementKind::Door)
+            ASSERT_TRUE(fresh.setDoor(Door{i}, wanderer.open(Door{i})));
+        else
+            ASSERT_TRUE(fresh.setWeight(LightSet{i}, wanderer.weight(LightSet{i})));
+    }
+    ASSERT_TRUE(fresh.submit());
+    const auto a = wanderer.readPages(), b = fresh.readPages();
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->irradiance, b->irradiance);
+    EXPECT_EQ(a->direction, b->direction);
+}
+
+// All 2^16 highlights at 16 ambient shares, next to a base that has one as well.
+TEST_F(RuntimeTest, AgreesWithTheCpuForEveryHighlight) {
+    PackData data = test::emptyPack(1, 0);
+    data.page_count = 16;
+    data.page_width = data.page_height = 256;
+    test::Random random(8);
+    const test::ClusterPlan plans[] = {{{0}, 1u << 20}};
+    test::fillPack(data, plans, random);
+    for (uint32_t i = 0; i < data.payload.size(); ++i) data.payload[i].direction = (i >> 16) * 17 | (i & 0xffff) << 8;
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    for (const char* state : {"set0=1", "set0=0.37/1.9/0.001"}) {
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
+}
+
+TEST_F(RuntimeTest, AgreesWithTheCpuOnHostileRecords) {
+    PackData data = test::randomPack(9);
+    test::Random random(9);
+    for (auto* records : {&data.base_pages, &data.payload})
+        for (TexelRecord& record : *records)
+            record = {static_cast<uint32_t>(random()), static_cast<uint32_t>(random())};
+    data.elements[0].max_weight = 65536;
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    for (const char* state : {"set0=1", "set0=65536,door:door1=0.3", "all=0.0000001,door:door1=1,door:door0=1"}) {
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
+}
+
+TEST_F(RuntimeTest, NothingChangedIsNoDispatchAndNoSubmission) {
+    Runtime runtime = runtimeOf(packOf(test::randomPack(2)));
+    ASSERT_GT(runtime.submit()->dispatches, 0u);
+    const uint64_t value = runtime.semaphoreValue();
+    const auto stats = runtime.submit();
+    ASSERT_TRUE(stats);
+    EXPECT_EQ(stats->dispatches, 0u);
+    EXPECT_EQ(stats->bytes_read, 0u);
+    EXPECT_EQ(runtime.semaphoreValue(), value);
+    EXPECT_EQ(runtime.record(VK_NULL_HANDLE)->dispatches, 0u);  // touches no command buffer
+    EXPECT_EQ(runtime.wait()->gpu_us, 0);
+}
+
+TEST_F(RuntimeTest, WaitTellsTheTimeOnTheGpu) {
+    Runtime runtime = runtimeOf(packOf(test::randomPack(2)));
+    ASSERT_TRUE(runtime.submit());
+    const auto stats = runtime.wait();
+    ASSERT_TRUE(stats);
+    EXPECT_GT(stats->gpu_us, 0);
+    uint64_t done = 0;
+    vkGetSemaphoreCounterValue(device().context().device, runtime.semaphore(), &done);
+    EXPECT_EQ(done, runtime.semaphoreValue());
+
+    Runtime untimed = runtimeOf(packOf(test::randomPack(2)), {.timestamps = false});
+    ASSERT_TRUE(untimed.submit());
+    EXPECT_EQ(untimed.wait()->gpu_us, 0);
+}
+
+TEST_F(RuntimeTest, RecordsIntoTheCallersCommandBuffer) {
+    const VulkanContext vulkan = device().context();
+    const VkCommandPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr,
+                                            VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT, vulkan.queue_family};
+    VkCommandPool pool = VK_NULL_HANDLE;
+    ASSERT_EQ(vkCreateCommandPool(vulkan.device, &pool_info, nullptr, &pool), VK_SUCCESS);
+    const VkCommandBufferAllocateInfo allocate{VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, nullptr, pool,
+                                               VK_COMMAND_BUFFER_LEVEL_PRIMARY, 1};
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    ASSERT_EQ(vkAllocateCommandBuffers(vulkan.device, &allocate, &commands), VK_SUCCESS);
+
+    const Pack pack = packOf(test::randomPack(3));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    const VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr,
+                                         VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT, nullptr};
+    VkSubmitInfo submit{};
+    submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+    submit.commandBufferCount = 1;
+    submit.pCommandBuffers = &commands;
+    for (const char* state : {"set1=0.5", "set2=0,door:door0=1", "all=0"}) {
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        ASSERT_EQ(vkBeginCommandBuffer(commands, &begin), VK_SUCCESS);
+        const auto stats = gpu.record(commands);
+        ASSERT_TRUE(stats);
+        EXPECT_GT(stats->dispatches, 0u);
+        ASSERT_EQ(vkEndCommandBuffer(commands), VK_SUCCESS);
+        ASSERT_EQ(vkQueueSubmit(vulkan.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
+        ASSERT_EQ(vkQueueWaitIdle(vulkan.queue), VK_SUCCESS);
+        EXPECT_GT(gpu.wait()->gpu_us, 0);
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
+    vkDestroyCommandPool(vulkan.device, pool, nullptr);
+}
+
+TEST_F(RuntimeTest, OneSetToggledRunsExactlyTheBatchesThatHoldIt) {
+    const Pack pack = packOf(test::randomPack(4, {.sets = 12, .doors = 0}));
+    Runtime runtime = runtimeOf(pack);
+    ASSERT_TRUE(runtime.submit());
+    for (uint32_t set = 0; set < 12; ++set) {
+        uint32_t holding = 0;
+        for (const Cluster& c : pack.data().clusters)
+            for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t)
+                if (pack.data().terms[t].contribution == set) holding += (c.receiver_count + 63) / 64;
+        ASSERT_TRUE(runtime.setWeight(LightSet{set}, 0));
+        EXPECT_EQ(runtime.submit()->batches, holding);
+        ASSERT_TRUE(runtime.setWeight(LightSet{set}, 1));
+        EXPECT_EQ(runtime.submit()->batches, holding);
+    }
+}
+
+// More batches than one side of a dispatch may have on common devices: the grid is cut into rows.
+TEST_F(RuntimeTest, MoreBatchesThanOneSideOfADispatch) {
+    PackData data = test::emptyPack(2, 0);
+    data.page_count = 1;
+    data.page_width = data.page_height = 512;
+    test::Random random(10);
+    const test::ClusterPlan plans[] = {{{0}, 150000}, {{0, 1}, 70000}};
+    test::fillPack(data, plans, random, 1);
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    const auto stats = gpu.submit();
+    ASSERT_TRUE(stats);
+    EXPECT_EQ(stats->batches, 220000u);
+    EXPECT_EQ(stats->dispatches, 2u);
+    cpu.update();
+    expectEqualPages(gpu, cpu);
+}
+
+TEST_F(RuntimeTest, ALevelWithoutDynamicLightHasItsPagesAndNoWork) {
+    PackData data = test::emptyPack(2, 1);
+    data.page_count = 1;
+    data.page_width = 5;
+    data.page_height = 3;
+    test::Random random(11);
+    test::fillPack(data, {}, random);
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    ASSERT_TRUE(gpu.apply("all=0,door:door0=1"));
+    EXPECT_EQ(gpu.submit()->dispatches, 0u);
+    EXPECT_TRUE(gpu.wait());
+    expectEqualPages(gpu, CpuRuntime(pack));
+}
+
+// A page of more than one staging buffer, with a last piece that is not whole.
+TEST_F(RuntimeTest, UploadsAndReadsLargePagesInPieces) {
+    PackData data = test::emptyPack(1, 0);
+    data.page_count = 2;
+    data.page_width = 2048;
+    data.page_height = 1027;
+    test::Random random(12);
+    const test::ClusterPlan plans[] = {{{0}, 2100000}};
+    test::fillPack(data, plans, random);
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    ASSERT_TRUE(gpu.submit());
+    cpu.update();
+    expectEqualPages(gpu, cpu);
+}
+
+TEST_F(RuntimeTest, APackThatDoesNotFitABufferIsRefusedWithFigures) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(device().context().physical_device, &properties);
+    const uint64_t range = properties.limits.maxStorageBufferRange;
+    if (range > 1ull << 28) GTEST_SKIP() << "this device binds " << range << " bytes; a test of that size is too much";
+    PackData data = test::emptyPack(16, 0);
+    data.page_count = 1;
+    data.page_width = data.page_height = 2048;
+    test::ClusterPlan plan;
+    for (uint32_t k = 0; k < 16; ++k) plan.contributions.push_back(k);
+    plan.receivers = static_cast<uint32_t>(range / 8 / 16 + 1);
+    test::Random random(13);
+    test::fillPack(data, std::span(&plan, 1), random);
+    const Pack pack = packOf(std::move(data));
+    const auto refused = Runtime::create(device().context(), pack);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr(std::to_string(range)));
+    EXPECT_THAT(refused.error().message, testing::HasSubstr(std::to_string(uint64_t{plan.receivers} * 16 * 8)));
+}
+
+TEST_F(RuntimeTest, ANullContextIsRefused) {
+    const auto refused = Runtime::create({}, packOf(test::randomPack(1)));
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+}
+
+TEST_F(RuntimeTest, OutlivesItsPackAndMayBeMovedAndDroppedMidFlight) {
+    std::optional<Pack> pack = packOf(test::randomPack(14));
+    Runtime first = runtimeOf(*pack);
+    CpuRuntime cpu(*pack);
+    pack.reset();
+    ASSERT_TRUE(first.submit());
+    Runtime second = std::move(first);
+    ASSERT_TRUE(second.apply("set0=0.25") && cpu.apply("set0=0.25"));
+    ASSERT_TRUE(second.submit());
+    cpu.update();
+    expectEqualPages(second, cpu);
+    ASSERT_TRUE(second.apply("all=0"));
+    ASSERT_TRUE(second.submit());
+    second = runtimeOf(second.pack());  // drops the one in flight
+    ASSERT_TRUE(second.submit());
+}
+
+}  // namespace
+}  // namespace dimmer

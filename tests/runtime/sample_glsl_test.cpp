@@ -1,0 +1,216 @@
+// sample.glsl through the device's own sampler, held against its CPU twin.
+#include <dimmer/cpu_runtime.h>
+#include <dimmer/runtime.h>
+#include <gpu/transfer.h>
+#include <gpu/vk_struct.h>
+#include <spirv/sample_lightmap_comp.h>
+
+#include "gpu_fixture.h"
+#include "random_pack.h"
+
+#include <cstring>
+
+namespace dimmer {
+namespace {
+
+struct Query {
+    std::array<float, 4> uv_page;  // w: exposure
+    std::array<float, 4> normal_tangent;
+};
+
+void check(VkResult result) {
+    if (result != VK_SUCCESS) throw std::runtime_error("a Vulkan call of the test failed");
+}
+
+template <class T>
+T valueOf(Expected<T> expected) {
+    if (!expected) throw std::runtime_error(expected.error().message);
+    return std::move(*expected);
+}
+
+// The kernel sample_lightmap.comp over a lightmap.
+class Sampler {
+   public:
+    Sampler(const VulkanContext& vulkan, const LightmapImages& images) : vulkan_(vulkan), images_(images) {
+        createPipeline();
+    }
+
+    std::vector<std::array<float, 4>> sample(const std::vector<Query>& queries) {
+        const GpuBuffer input = valueOf(createBuffer(vulkan_, queries.size() * sizeof(Query),
+                                                     VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Upload));
+        std::vector<std::array<float, 4>> results(queries.size());
+        const GpuBuffer output = valueOf(createBuffer(vulkan_, results.size() * sizeof(results[0]),
+                                                      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Readback));
+        std::memcpy(input.mapped, queries.data(), input.size_bytes);
+        writeDescriptors(input.buffer.get(), output.buffer.get());
+        auto transfer = valueOf(Transfer::create(vulkan_, MemoryUse::Readback));
+        const auto done = transfer.run([&](VkCommandBuffer commands) {
+            vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_.get());
+            vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, layout_.get(), 0, 1, &set_, 0, nullptr);
+            vkCmdDispatch(commands, static_cast<uint32_t>((queries.size() + 63) / 64), 1, 1);
+            auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+            barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+            barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
+            vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1,
+                                 &barrier, 0, nullptr, 0, nullptr);
+        });
+        if (!done) throw std::runtime_error(done.error().message);
+        std::memcpy(results.data(), output.mapped, output.size_bytes);
+        return results;
+    }
+
+   private:
+    void createPipeline() {
+        std::array<VkDescriptorSetLayoutBinding, 4> bindings{};
+        for (uint32_t i = 0; i < 4; ++i)
+            bindings[i] = {i, i < 2 ? VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1,
+                           VK_SHADER_STAGE_COMPUTE_BIT, nullptr};
+        auto set_info = vkStruct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
+        set_info.bindingCount = 4;
+        set_info.pBindings = bindings.data();
+        VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
+        check(vkCreateDescriptorSetLayout(vulkan_.device, &set_info, nullptr, &set_layout));
+        set_layout_ = SetLayoutHandle(vulkan_.device, set_layout);
+
+        auto layout_info = vkStruct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
+        layout_info.setLayoutCount = 1;
+        layout_info.pSetLayouts = &set_layout;
+        VkPipelineLayout layout = VK_NULL_HANDLE;
+        check(vkCreatePipelineLayout(vulkan_.device, &layout_info, nullptr, &layout));
+        layout_ = PipelineLayoutHandle(vulkan_.device, layout);
+
+        auto module_info = vkStruct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
+        module_info.codeSize = sizeof(spirv::sample_lightmap_comp);
+        module_info.pCode = spirv::sample_lightmap_comp;
+        VkShaderModule raw_module = VK_NULL_HANDLE;
+        check(vkCreateShaderModule(vulkan_.device, &module_info, nullptr, &raw_module));
+        const ShaderModuleHandle module(vulkan_.device, raw_module);
+
+        auto info = vkStruct<VkComputePipelineCreateInfo>(VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO);
+        info.stage = vkStruct<VkPipelineShaderStageCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO);
+        info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
+        info.stage.module = raw_module;
+        info.stage.pName = "main";
+        info.layout = layout;
+        VkPipeline pipeline = VK_NULL_HANDLE;
+        check(vkCreateComputePipelines(vulkan_.device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline));
+        pipeline_ = PipelineHandle(vulkan_.device, pipeline);
+
+        const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 2},
+                                              {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2}};
+        auto pool_info = vkStruct<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
+        pool_info.maxSets = 1;
+        pool_info.poolSizeCount = 2;
+        pool_info.pPoolSizes = sizes;
+        VkDescriptorPool pool = VK_NULL_HANDLE;
+        check(vkCreateDescriptorPool(vulkan_.device, &pool_info, nullptr, &pool));
+        pool_ = DescriptorPoolHandle(vulkan_.device, pool);
+        auto allocate = vkStruct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
+        allocate.descriptorPool = pool;
+        allocate.descriptorSetCount = 1;
+        allocate.pSetLayouts = &set_layout;
+        check(vkAllocateDescriptorSets(vulkan_.device, &allocate, &set_));
+    }
+
+    void writeDescriptors(VkBuffer input, VkBuffer output) {
+        const VkDescriptorImageInfo images[] = {
+            {images_.sampler, images_.irradiance_view, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL},
+            {images_.sampler, images_.direction_view, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL}};
+        const VkDescriptorBufferInfo buffers[] = {{input, 0, VK_WHOLE_SIZE}, {output, 0, VK_WHOLE_SIZE}};
+        std::array<VkWriteDescriptorSet, 4> writes;
+        for (uint32_t i = 0; i < 4; ++i) {
+            writes[i] = vkStruct<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
+            writes[i].dstSet = set_;
+            writes[i].dstBinding = i;
+            writes[i].descriptorCount = 1;
+            writes[i].descriptorType =
+                i < 2 ? VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+            if (i < 2)
+                writes[i].pImageInfo = &images[i];
+            else
+                writes[i].pBufferInfo = &buffers[i - 2];
+        }
+        vkUpdateDescriptorSets(vulkan_.device, 4, writes.data(), 0, nullptr);
+    }
+
+    VulkanContext vulkan_;
+    LightmapImages images_;
+    SetLayoutHandle set_layout_;
+    PipelineLayoutHandle layout_;
+    PipelineHandle pipeline_;
+    DescriptorPoolHandle pool_;
+    VkDescriptorSet set_ = VK_NULL_HANDLE;
+};
+
+// Two pages of smooth light with highlights well off the surface; no dynamic light is needed here.
+Pack smoothPack() {
+    PackData data;
+    data.exposure = 0.25f;
+    data.page_count = 2;
+    data.page_width = 16;
+    data.page_height = 8;
+    for (uint32_t page = 0; page < 2; ++page)
+        for (uint32_t y = 0; y < 8; ++y)
+            for (uint32_t x = 0; x < 16; ++x) {
+                // r = 64/255, |m| at most 64/127 of a share of 0.75: d_z at least 0.67.
+                const uint32_t irradiance = test::floorUfloatCode(10 + x + 50 * page, 6) |
+                                            test::floorUfloatCode(20 + y, 6) << 11 |
+                                            test::floorUfloatCode(30 - x, 5) << 22;
+                data.base_pages.push_back({irradiance, 64u | (128 - 45 + 6 * x) << 8 | (128 - 45 + 12 * y) << 16});
+            }
+    return valueOf(Pack::fromData(std::move(data)));
+}
+
+// Shares of the irradiance on the surface's own normal.
+struct Tolerance {
+    float own_normal, other_normals;
+};
+
+class SampleGlslTest : public test::GpuTest {
+   protected:
+    // Samples at `uvs` of both pages for several normals on both executors.
+    void expectAgreement(const std::vector<std::array<float, 2>>& uvs, const Tolerance& tolerance) {
+        const Pack pack = smoothPack();
+        const CpuRuntime cpu(pack);
+        const Runtime gpu = valueOf(Runtime::create(device().context(), pack));
+        constexpr std::array<std::array<float, 3>, 5> normals{
+            {{0, 0, 1}, {0.6f, 0, 0.8f}, {0, -0.8f, 0.6f}, {-0.48f, 0.6f, 0.64f}, {0.6f, 0.64f, -0.48f}}};
+        std::vector<Query> queries;
+        for (float page : {0.0f, 1.0f})
+            for (const auto& uv : uvs)
+                for (const auto& n : normals)
+                    queries.push_back({{uv[0], uv[1], page, pack.exposure()}, {n[0], n[1], n[2], 0}});
+        const auto results = Sampler(device().context(), gpu.images()).sample(queries);
+        auto onCpu = [&](const std::array<float, 4>& uv, const std::array<float, 4>& n) {
+            return sampleLightmap(pack, cpu.irradiancePages(), cpu.directionPages(), static_cast<uint32_t>(uv[2]),
+                                  {uv[0], uv[1]}, {n[0], n[1], n[2]});
+        };
+        for (size_t i = 0; i < queries.size(); ++i) {
+            const auto& [uv, n] = queries[i];
+            const auto expected = onCpu(uv, n), e_z = onCpu(uv, {0, 0, 1, 0});
+            const float share = n[2] == 1 ? tolerance.own_normal : tolerance.other_normals;
+            for (size_t c = 0; c < 3; ++c)
+                EXPECT_NEAR(results[i][c], expected[c], share * e_z[c])
+                    << "at " << uv[0] << " " << uv[1] << " page " << uv[2] << " normal " << n[0] << " " << n[1];
+        }
+    }
+};
+
+TEST_F(SampleGlslTest, AgreesWithTheCpuAtTexelCentres) {
+    std::vector<std::array<float, 2>> centres;
+    for (float y = 0.5f; y < 8; ++y)
+        for (float x = 0.5f; x < 16; ++x) centres.push_back({x / 16, y / 8});
+    expectAgreement(centres, {.own_normal = 1e-5f, .other_normals = 1e-5f});
+}
+
+// Samplers mix with weights of 8 bits: neighbours here differ by a tenth, so 1e-3 is generous for colour. Some also mix
+// bytes in bytes: an error of 1.5 bytes in m is 0.012, times up to 3 for the way from m to b at this d_z.
+TEST_F(SampleGlslTest, AgreesWithTheCpuBetweenTexelsAndPastEdges) {
+    test::Random random(1);
+    std::vector<std::array<float, 2>> places = {{0, 0}, {1, 1}, {-0.5f, 0.3f}, {0.4f, 1.5f}};
+    for (int i = 0; i < 200; ++i) places.push_back({test::uniform(random, 0, 1), test::uniform(random, 0, 1)});
+    expectAgreement(places, {.own_normal = 1e-3f, .other_normals = 0.036f});
+}
+
+}  // namespace
+}  // namespace dimmer

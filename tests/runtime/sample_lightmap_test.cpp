@@ -1,0 +1,96 @@
+#include <dimmer/cpu_runtime.h>
+#include <format/texel.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "random_pack.h"
+
+namespace dimmer {
+namespace {
+
+constexpr uint32_t no_direction = 255u | 128u << 8 | 128u << 16;
+
+// One page; exposure 2, so that forgetting it shows.
+Pack pageOf(uint32_t width, uint32_t height) {
+    PackData data;
+    data.exposure = 2;
+    data.page_count = 1;
+    data.page_width = width;
+    data.page_height = height;
+    data.base_pages.resize(size_t{width} * height);
+    auto pack = Pack::fromData(std::move(data));
+    if (!pack) throw std::runtime_error(pack.error().message);
+    return *pack;
+}
+
+TEST(SampleLightmap, TheSurfacesOwnNormalGetsTheStoredIrradianceExactly) {
+    const Pack pack = pageOf(1, 1);
+    test::Random random(1);
+    for (uint32_t r8 = 0; r8 < 256; ++r8) {
+        for (int i = 0; i < 100; ++i) {
+            const uint32_t irradiance = test::randomIrradiance(random, 1);
+            const uint32_t direction = r8 | (test::randomDirection(random) & 0xffff00);
+            const auto e =
+                sampleLightmap(pack, std::array{irradiance}, std::array{direction}, 0, {0.5f, 0.5f}, {0, 0, 1});
+            const auto [r, g, b] = decodeR11G11B10(irradiance);
+            ASSERT_EQ(e, (std::array{r / 2, g / 2, b / 2})) << r8;
+        }
+    }
+}
+
+TEST(SampleLightmap, FollowsTheHighlightModel) {
+    const Pack pack = pageOf(1, 1);
+    // r = 51/255 = 0.2; m = (76/127, 0): d_x = m / 0.8, d_z = sqrt(1 - d_x^2).
+    const uint32_t direction = 51u | (128u + 76u) << 8 | 128u << 16;
+    const double d_x = 76.0 / 127 / 0.8, d_z = std::sqrt(1 - d_x * d_x);
+    const uint32_t irradiance = encodeR11G11B10(8, 4, 2);
+    for (double degrees = -90; degrees <= 90; degrees += 5) {
+        const double n_x = std::sin(degrees * M_PI / 180), n_z = std::cos(degrees * M_PI / 180);
+        const double expected = 0.2 + 0.8 * std::max(0.0, n_x * d_x + n_z * d_z) / d_z;
+        const auto e = sampleLightmap(pack, std::array{irradiance}, std::array{direction}, 0, {0.5f, 0.5f},
+                                      {static_cast<float>(n_x), 0, static_cast<float>(n_z)});
+        EXPECT_NEAR(e[0], 4 * expected, 1e-5);
+        EXPECT_NEAR(e[1], 2 * expected, 1e-5);
+        EXPECT_NEAR(e[2], 1 * expected, 1e-5);
+    }
+}
+
+TEST(SampleLightmap, InterpolatesBetweenTexelCentresAndClampsAtEdges) {
+    const Pack pack = pageOf(4, 2);
+    std::vector<uint32_t> irradiance, direction(8, no_direction);
+    for (uint32_t i = 0; i < 8; ++i) irradiance.push_back(encodeR11G11B10(static_cast<float>(1 << i), 0, 0));
+    auto at = [&](double x, double y) {  // in texels
+        return sampleLightmap(pack, irradiance, direction, 0, {static_cast<float>(x / 4), static_cast<float>(y / 2)},
+                              {0, 0, 1})[0] *
+               2;
+    };
+    for (uint32_t i = 0; i < 8; ++i) EXPECT_FLOAT_EQ(at(i % 4 + 0.5, i / 4 + 0.5), static_cast<float>(1 << i));
+    EXPECT_FLOAT_EQ(at(1, 0.5), 1.5f);  // between 1 and 2
+    EXPECT_FLOAT_EQ(at(0.5, 1), (1 + 16) / 2.0f);
+    EXPECT_FLOAT_EQ(at(1.75, 1.25), 0.25f * (0.75f * 2 + 0.25f * 4) + 0.75f * (0.75f * 32 + 0.25f * 64));
+    EXPECT_FLOAT_EQ(at(0, 0), 1);
+    EXPECT_FLOAT_EQ(at(-3, 9), 16);
+    EXPECT_FLOAT_EQ(at(4, 2), 128);
+    EXPECT_FLOAT_EQ(at(99, 0), 8);
+}
+
+TEST(SampleLightmap, ATexelWithoutDirectionPullsItsNeighbourTowardsNone) {
+    const Pack pack = pageOf(2, 1);
+    const uint32_t irradiance = encodeR11G11B10(2, 2, 2);
+    // r = 0, d_x = 0.6 (76.2/127, so 76), and none: halfway r = 0.5, m = 38/127.
+    const std::array direction{0u | (128u + 76u) << 8 | 128u << 16, no_direction};
+    const double r = 0.5, m = 38.0 / 127, d_x = m / 0.5, d_z = std::sqrt(1 - d_x * d_x);
+    const double n_x = 0.6, n_z = 0.8;
+    const auto e =
+        sampleLightmap(pack, std::array{irradiance, irradiance}, direction, 0, {0.5f, 0.5f}, {0.6f, 0, 0.8f});
+    EXPECT_NEAR(e[0], r + (1 - r) * (n_x * d_x + n_z * d_z) / d_z, 1e-5);
+}
+
+TEST(SampleLightmap, AnUnknownPageIsDark) {
+    const Pack pack = pageOf(1, 1);
+    const std::array texel{encodeR11G11B10(1, 1, 1)}, direction{no_direction};
+    EXPECT_THAT(sampleLightmap(pack, texel, direction, 1, {0.5f, 0.5f}, {0, 0, 1}), testing::Each(0.0f));
+}
+
+}  // namespace
+}  // namespace dimmer

@@ -1,0 +1,317 @@
+// Files that cannot be used: one clear message, never a crash.
+#include <scene/expectations.h>
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <random>
+
+namespace dimmer::cook::test {
+namespace {
+
+std::vector<uint8_t> bytesOf(const std::string& text) {
+    return {text.begin(), text.end()};
+}
+
+// Every kind of content in one file, so that mutations have something to hit.
+LevelFile fullLevel() {
+    LevelFile level = LevelFile::withFloor();
+    const int glow = level.addMaterial({{"name", "glow"}, {"emissiveFactor", {1, 1, 1}}});
+    level.addNode(
+        {{"name", "panel"}, {"mesh", level.addSquareMesh(glow)}, {"extras", {{"dimmer_light_set", "panels"}}}});
+    level.addNode({{"name", "door"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", "front"}}}});
+    level.addLight("lamp", {{"type", "spot"}, {"spot", json::object()}, {"intensity", 5}},
+                   {{"dimmer_light_set", "hall"}});
+    level.document["scenes"][0]["extras"] = {
+        {"dimmer_combinations", json::array({json::array({"door:front", "hall"})})},
+        {"dimmer_sky_color", {1, 1, 1}},
+        {"dimmer_sky_luminance", 10}};
+    const uint16_t target = 1;
+    const glm::vec3 value(2, 0, 0);
+    level.document["accessors"][0]["sparse"] = {
+        {"count", 1},
+        {"indices", {{"bufferView", level.addView(&target, sizeof(target))}, {"componentType", 5123}}},
+        {"values", {{"bufferView", level.addView(&value, sizeof(value))}}}};
+    return level;
+}
+
+TEST(SceneBadInput, MissingAndUnreadableFiles) {
+    const TemporaryFolder folder;
+    for (const auto& path : {folder.path / "level.missing.glb", folder.path}) {
+        const auto scene = importLevel(path);
+        ASSERT_FALSE(scene.has_value());
+        EXPECT_EQ(scene.error().code, ErrorCode::Io);
+        EXPECT_THAT(scene.error().message, testing::HasSubstr(path.filename().string()));
+    }
+}
+
+TEST(SceneBadInput, NotGltf) {
+    expectBadInput(importBytes("level.glb", {}), {"empty"});
+    expectBadInput(importBytes("level.glb", bytesOf("glTF")), {"truncated"});
+    for (const char* text : {"hello", "{", "[]", "{}", "null", R"({"asset": {"version": "1.0"}})"})
+        expectBadInput(importBytes("level.gltf", bytesOf(text)), {});
+    expectBadInput(importBytes("level.gltf", bytesOf(R"({"asset": {"version": "2.0"}})")), {"scene"});
+    expectBadInput(LevelFile().import(), {"no triangles"});
+}
+
+TEST(SceneBadInput, DeepNestingDoesNotExhaustTheStack) {
+    const std::string deep =
+        R"({"asset": {"version": "2.0"}, "extras": )" + std::string(200000, '[') + std::string(200000, ']') + "}";
+    expectBadInput(importBytes("level.gltf", bytesOf(deep)), {"nests"});
+    // Brackets in texts do not nest.
+    LevelFile level = LevelFile::withFloor();
+    level.node(0)["extras"]["note"] = "\\\"" + std::string(1000, '[');
+    ASSERT_IMPORTED(level.import());
+}
+
+TEST(SceneBadInput, ALongChainOfNodesIsFine) {
+    LevelFile level = LevelFile::withFloor();
+    int parent = level.addNode({{"translation", {1, 0, 0}}});
+    for (int i = 0; i < 20000; ++i) parent = level.addNode(json::object(), parent);
+    level.node(parent)["mesh"] = 0;
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectNear(scene->meshes[1].positions_m[0], {0, 0, -1});
+}
+
+struct Fault {
+    const char* name;
+    std::function<void(json&)> apply;
+    std::vector<std::string> message;
+};
+
+TEST(SceneBadInput, IndicesOutOfRangeNameTheirOwner) {
+    const Fault faults[] = {
+        {"node's mesh", [](json& d) { d["nodes"][1]["mesh"] = 99; }, {"node 'panel'", "mesh 99"}},
+        {"negative mesh", [](json& d) { d["nodes"][1]["mesh"] = -7; }, {"node 'panel'", "mesh -7"}},
+        {"node's light",
+         [](json& d) { d["nodes"][3]["extensions"]["KHR_lights_punctual"]["light"] = 4; },
+         {"node 'lamp'", "light 4"}},
+        {"no light",
+         [](json& d) { d["nodes"][3]["extensions"]["KHR_lights_punctual"] = json::object(); },
+         {"node 'lamp'"}},
+        {"node's camera", [](json& d) { d["nodes"][0]["camera"] = 0; }, {"node 'floor'", "camera 0"}},
+        {"child", [](json& d) { d["nodes"][0]["children"] = {44}; }, {"node 'floor'", "44"}},
+        {"root", [](json& d) { d["scenes"][0]["nodes"] = {44}; }, {"scene 0", "44"}},
+        {"default scene", [](json& d) { d["scene"] = 3; }, {"scene 3"}},
+        {"material", [](json& d) { d["meshes"][0]["primitives"][0]["material"] = 9; }, {"mesh 0", "material 9"}},
+        {"attribute",
+         [](json& d) { d["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = 77; },
+         {"mesh 0", "NORMAL", "77"}},
+        {"texture",
+         [](json& d) { d["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = 2; },
+         {"material 'white'", "texture 2"}},
+        {"accessor's view", [](json& d) { d["accessors"][0]["bufferView"] = 50; }, {"accessor 0", "buffer view 50"}},
+        {"view's buffer", [](json& d) { d["bufferViews"][0]["buffer"] = 2; }, {"buffer view 0", "buffer 2"}},
+        {"sparse view",
+         [](json& d) { d["accessors"][0]["sparse"]["values"]["bufferView"] = 60; },
+         {"node 'floor'", "buffer view 60"}},
+        {"own child", [](json& d) { d["nodes"][0]["children"] = {0}; }, {"node 'floor'", "ancestor"}},
+        {"cycle",
+         [](json& d) {
+             d["nodes"][0]["children"] = {1};
+             d["nodes"][1]["children"] = {0};
+             d["scenes"][0]["nodes"] = {2};
+         },
+         {"node 'floor'", "cycle"}},
+        {"two parents",
+         [](json& d) {
+             d["nodes"][0]["children"] = {2};
+             d["nodes"][1]["children"] = {2};
+             d["scenes"][0]["nodes"] = {0, 1, 3};
+         },
+         {"node 'door'", "node 'floor'", "node 'panel'"}},
+        {"root twice",
+         [](json& d) {
+             d["scenes"][0]["nodes"] = {0, 0};
+         },
+         {"node 'floor'", "twice"}},
+        {"root and child", [](json& d) { d["nodes"][0]["children"] = {1}; }, {"node 'panel'"}},
+    };
+    for (const Fault& fault : faults) {
+        LevelFile level = fullLevel();
+        fault.apply(level.document);
+        SCOPED_TRACE(fault.name);
+        expectBadInput(level.import(), fault.message);
+    }
+}
+
+TEST(SceneBadInput, AccessorsBeyondTheirBytes) {
+    static constexpr uint64_t huge = std::numeric_limits<uint64_t>::max();
+    const Fault faults[] = {
+        {"view too long", [](json& d) { d["bufferViews"][0]["byteLength"] = 1 << 20; }, {"buffer view 0"}},
+        {"view offset wraps", [](json& d) { d["bufferViews"][0]["byteOffset"] = huge - 8; }, {"buffer view 0"}},
+        {"count", [](json& d) { d["accessors"][1]["count"] = 5; }, {"node 'floor'", "NORMAL", "do not fit"}},
+        {"count 4e9", [](json& d) { d["accessors"][1]["count"] = 4000000000u; }, {"node 'floor'", "NORMAL"}},
+        {"count wraps", [](json& d) { d["accessors"][1]["count"] = huge / 12 + 2; }, {"node 'floor'", "NORMAL"}},
+        {"count 0", [](json& d) { d["accessors"][1]["count"] = 0; }, {"node 'floor'", "NORMAL"}},
+        {"offset", [](json& d) { d["accessors"][1]["byteOffset"] = 4; }, {"node 'floor'", "NORMAL"}},
+        {"offset wraps", [](json& d) { d["accessors"][1]["byteOffset"] = huge - 3; }, {"node 'floor'", "NORMAL"}},
+        {"stride too small", [](json& d) { d["bufferViews"][1]["byteStride"] = 8; }, {"node 'floor'", "stride"}},
+        {"stride too large", [](json& d) { d["bufferViews"][1]["byteStride"] = 252; }, {"node 'floor'", "do not fit"}},
+        {"no data", [](json& d) { d["accessors"][1].erase("bufferView"); }, {"node 'floor'", "NORMAL", "missing"}},
+        {"sparse of 4e9",
+         [](json& d) {
+             d["accessors"][0].erase("bufferView");
+             d["accessors"][0]["count"] = 4000000000u;
+         },
+         {"node 'floor'", "POSITION", "4000000000"}},
+        {"sparse target",
+         [](json& d) { d["accessors"][0]["sparse"]["indices"]["componentType"] = 5125; },
+         {"node 'floor'", "POSITION"}},
+        {"wrong type", [](json& d) { d["accessors"][0]["type"] = "VEC2"; }, {"node 'floor'", "POSITION", "VEC3"}},
+        {"fewer normals", [](json& d) { d["accessors"][1]["count"] = 3; }, {"node 'floor'", "NORMAL", "3", "4"}},
+        {"doubles", [](json& d) { d["accessors"][0]["componentType"] = 5130; }, {"node 'floor'", "POSITION"}},
+        {"no positions",
+         [](json& d) { d["meshes"][0]["primitives"][0]["attributes"].erase("POSITION"); },
+         {"node 'floor'", "POSITION"}},
+        {"float indices", [](json& d) { d["accessors"][2]["componentType"] = 5126; }, {"node 'floor'", "indices"}},
+        {"buffer length",
+         [](json& d) {
+             d["buffers"] = {{{"byteLength", huge}, {"uri", "data:application/octet-stream;base64,AAAA"}}};
+         },
+         {}},
+        {"missing buffer",
+         [](json& d) {
+             d["buffers"] = {{{"byteLength", 4}, {"uri", "gone.bin"}}};
+         },
+         {"gone.bin"}},
+        {"device as buffer",
+         [](json& d) {
+             d["buffers"] = {{{"byteLength", 4}, {"uri", "../../../../../dev/zero"}}};
+         },
+         {"zero"}},
+    };
+    for (const Fault& fault : faults) {
+        LevelFile level = fullLevel();
+        fault.apply(level.document);
+        SCOPED_TRACE(fault.name);
+        expectBadInput(level.import(), fault.message);
+    }
+}
+
+TEST(SceneBadInput, VertexIndicesBeyondTheVertices) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, {0, 1, 3}, 0);
+    level.addNode({{"name", "wall"}, {"mesh", mesh}});
+    expectBadInput(level.import(), {"node 'wall'", "index 3", "3 vertices"});
+}
+
+TEST(SceneBadInput, NumbersThatAreNotFinite) {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
+    for (const float bad : {nan, infinity, -infinity}) {
+        LevelFile positions = LevelFile::withFloor();
+        positions.addNode(
+            {{"name", "wall"}, {"mesh", positions.addMesh({{0, 0, 0}, {1, bad, 0}, {0, 1, 0}}, {}, {0, 1, 2}, 0)}});
+        expectBadInput(positions.import(), {"node 'wall'", "POSITION", "vertex 1", "NaN"});
+
+        LevelFile normals = LevelFile::withFloor();
+        const int mesh =
+            normals.addMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 0, 1}, {0, 0, 1}, {0, 0, bad}}, {0, 1, 2}, 0);
+        normals.addNode({{"name", "wall"}, {"mesh", mesh}});
+        expectBadInput(normals.import(), {"node 'wall'", "NORMAL", "vertex 2"});
+    }
+    LevelFile far_away = LevelFile::withFloor();
+    far_away.node(0)["scale"] = {1e7, 1, 1};
+    expectBadInput(far_away.import(), {"node 'floor'", "km"});
+
+    std::string text = LevelFile::withFloor().gltfText();
+    text.replace(text.find("\"mesh\":0"), 8, "\"mesh\":0,\"translation\":[1e999,0,0]");
+    expectBadInput(importBytes("level.gltf", bytesOf(text)), {});
+}
+
+TEST(SceneBadInput, Transforms) {
+    const std::pair<json, std::string> cases[] = {
+        {{{"scale", {1, 0, 1}}}, "singular"},
+        {{{"scale", {1, 1e-12, 1}}}, "singular"},
+        {{{"matrix", {1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}, "singular"},
+        {{{"matrix", {1, 0, 0, 0.5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}}}, "matrix"},
+        {{{"matrix", {1, 2, 3}}}, "matrix"},
+        {{{"translation", {1e300, 0, 0}}}, "infinite"},
+        {{{"translation", {1, 2}}}, "translation"},
+        {{{"rotation", {0, 0, 0, 0}}}, "rotation"},
+        {{{"rotation", {0, 0, 1}}}, "rotation"},
+    };
+    for (const auto& [transform, message] : cases) {
+        LevelFile level = LevelFile::withFloor();
+        level.node(0).update(transform);
+        SCOPED_TRACE(transform.dump());
+        expectBadInput(level.import(), {"node 'floor'", message});
+    }
+    LevelFile above = LevelFile::withFloor();
+    const int flat = above.addNode({{"name", "flat"}, {"scale", {0, 0, 0}}});
+    ASSERT_IMPORTED(above.import());  // nothing stands below it
+    above.addNode({{"name", "crate"}, {"mesh", 0}}, flat);
+    expectBadInput(above.import(), {"node 'crate'", "node 'flat'", "singular"});
+}
+
+TEST(SceneBadInput, RequiredExtensionsMustBeKnown) {
+    LevelFile level = LevelFile::withFloor();
+    level.document["extensionsUsed"] = {"KHR_draco_mesh_compression"};
+    ASSERT_IMPORTED(level.import());
+    level.document["extensionsRequired"] = {"KHR_draco_mesh_compression"};
+    expectBadInput(level.import(), {"KHR_draco_mesh_compression"});
+}
+
+// Whatever the bytes: a scene or a message.
+void expectAnAnswer(const std::vector<uint8_t>& bytes) {
+    const auto scene = importBytes("level.glb", bytes);
+    if (!scene) {
+        EXPECT_THAT(scene.error().message, testing::HasSubstr("level.glb"));
+        EXPECT_NE(scene.error().code, ErrorCode::Internal);
+    }
+}
+
+TEST(SceneBadInput, EveryTruncationIsRefused) {
+    const std::vector<uint8_t> whole = fullLevel().glb();
+    ASSERT_IMPORTED(importBytes("level.glb", whole));
+    for (size_t length = 0; length < whole.size(); length += 5)
+        expectBadInput(importBytes("level.glb", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}),
+                       {});
+}
+
+TEST(SceneBadInput, FlippedBitsGetAnAnswer) {
+    const std::vector<uint8_t> whole = fullLevel().glb();
+    std::mt19937 random(1);
+    for (int i = 0; i < 1500; ++i) {
+        std::vector<uint8_t> bytes = whole;
+        for (int flips = 1 + i % 3; flips > 0; --flips)
+            bytes[random() % bytes.size()] ^= static_cast<uint8_t>(1u << random() % 8);
+        expectAnAnswer(bytes);
+    }
+}
+
+TEST(SceneBadInput, ReplacedNumbersGetAnAnswer) {
+    const std::string text = fullLevel().gltfText();
+    std::mt19937 random(2);
+    const char* values[] = {"-1",
+                            "0",
+                            "7",
+                            "4294967295",
+                            "18446744073709551615",
+                            "-9223372036854775808",
+                            "1e308",
+                            "1e999",
+                            "0.5",
+                            "null",
+                            "[]",
+                            "{}",
+                            "\"x\"",
+                            "true"};
+    for (int i = 0; i < 1500; ++i) {
+        std::string mutated = text;
+        size_t at = random() % mutated.size();
+        at = mutated.find_first_of("0123456789", at);
+        if (at == std::string::npos) continue;
+        const size_t end = std::min(mutated.find_first_not_of("0123456789.", at), mutated.size());
+        mutated.replace(at, end - at, values[random() % std::size(values)]);
+        const auto scene = importBytes("level.gltf", bytesOf(mutated));
+        if (!scene) {
+            EXPECT_THAT(scene.error().message, testing::HasSubstr("level.gltf"));
+        }
+    }
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

@@ -1,0 +1,290 @@
+// Light sets, doors, combinations, and the other dimmer_* keys.
+#include <scene/expectations.h>
+
+#include <cmath>
+
+namespace dimmer::cook::test {
+namespace {
+
+const json point_light = {{"type", "point"}, {"intensity", 10}};
+
+LevelFile levelWithLamp(const json& extras) {
+    LevelFile level = LevelFile::withFloor();
+    level.addLight("lamp", point_light, extras);
+    return level;
+}
+
+int addGlow(LevelFile& level) {
+    return level.addMaterial({{"name", "glow"}, {"emissiveFactor", {1, 1, 1}}});
+}
+
+TEST(SceneElements, LightSetsInOrderOfAppearanceShareNames) {
+    LevelFile level = levelWithLamp({{"dimmer_light_set", "hall"}});
+    level.addLight("lamp2", point_light, {{"dimmer_light_set", "alarm"}, {"dimmer_max_weight", 1.5}});
+    level.addLight("lamp3", point_light, {{"dimmer_light_set", "hall"}, {"dimmer_max_weight", 3}});
+    level.addLight("lamp4", point_light, {{"dimmer_light_set", "hall"}, {"dimmer_max_weight", 2}});
+    level.addLight("lamp5", point_light);
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->light_sets.size(), 2u);
+    EXPECT_EQ(scene->light_sets[0].name, "hall");
+    EXPECT_EQ(scene->light_sets[0].max_weight, 3.0f);
+    EXPECT_EQ(scene->light_sets[1].name, "alarm");
+    EXPECT_EQ(scene->light_sets[1].max_weight, 1.5f);
+    ASSERT_EQ(scene->lights.size(), 5u);
+    EXPECT_EQ(scene->lights[2].light_set, 0u);
+    EXPECT_EQ(scene->lights[1].light_set, 1u);
+    EXPECT_FALSE(scene->lights[4].light_set);
+}
+
+TEST(SceneElements, KeysOfTheLightSpeakWhenTheNodeHasNone) {
+    LevelFile level = levelWithLamp({{"dimmer_bake", "full"}});
+    level.document["extensions"]["KHR_lights_punctual"]["lights"][0]["extras"] = {{"dimmer_light_set", "hall"},
+                                                                                  {"dimmer_bake", "none"}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->lights[0].light_set, 0u);
+    EXPECT_EQ(scene->lights[0].bake, BakeMode::Full);  // the node's own key wins
+}
+
+TEST(SceneElements, BakeModes) {
+    for (const auto& [text, mode] :
+         {std::pair{"indirect", BakeMode::Indirect}, {"full", BakeMode::Full}, {"none", BakeMode::None}}) {
+        const auto scene = levelWithLamp({{"dimmer_bake", text}}).import();
+        ASSERT_IMPORTED(scene);
+        ASSERT_EQ(scene->lights.size(), 1u);
+        EXPECT_EQ(scene->lights[0].bake, mode);
+    }
+    expectBadInput(levelWithLamp({{"dimmer_bake", "direct"}}).import(),
+                   {"node 'lamp'", "dimmer_bake", "indirect", "direct"});
+}
+
+TEST(SceneElements, BlendersOrientationNodeTakesTheObjectsProperties) {
+    LevelFile level = LevelFile::withFloor();
+    const int object = level.addNode({{"name", "Lamp"}, {"extras", {{"dimmer_light_set", "hall"}}}});
+    level.addLight("Lamp_Orientation", point_light);
+    const int orientation = object + 1;
+    level.document["scenes"][0]["nodes"].erase(level.document["scenes"][0]["nodes"].size() - 1);
+    level.node(object)["children"] = {orientation};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->lights[0].light_set, 0u);
+}
+
+TEST(SceneElements, EmissiveMeshOfASet) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(addGlow(level));
+    level.addNode(
+        {{"name", "panel"}, {"mesh", mesh}, {"extras", {{"dimmer_light_set", "panels"}, {"dimmer_max_weight", 4}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_FALSE(scene->meshes[0].light_set);
+    EXPECT_EQ(scene->meshes[1].light_set, 0u);
+    EXPECT_EQ(scene->light_sets[0].max_weight, 4.0f);
+}
+
+TEST(SceneElements, AMaterialsSetTakesOnlyThatMaterial) {
+    LevelFile level = LevelFile::withFloor();
+    const int always_on = addGlow(level), switched = addGlow(level);
+    level.document["materials"][static_cast<size_t>(switched)]["extras"] = {{"dimmer_light_set", "sign"}};
+    const int mesh = level.addSquareMesh(always_on);
+    json second = level.primitive(mesh);
+    second["material"] = switched;
+    level.document["meshes"][static_cast<size_t>(mesh)]["primitives"].push_back(second);
+    level.addNode({{"name", "shop"}, {"mesh", mesh}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->meshes.size(), 3u);
+    EXPECT_FALSE(scene->meshes[1].light_set);
+    EXPECT_EQ(scene->meshes[1].triangle_materials[0], static_cast<uint32_t>(always_on));
+    EXPECT_EQ(scene->meshes[2].light_set, 0u);
+    EXPECT_EQ(scene->meshes[2].triangle_materials[0], static_cast<uint32_t>(switched));
+}
+
+TEST(SceneElements, ASetWithoutLightsIsRefused) {
+    LevelFile empty = LevelFile::withFloor();
+    empty.addNode({{"name", "lost"}, {"extras", {{"dimmer_light_set", "hall"}}}});
+    expectBadInput(empty.import(), {"node 'lost'", "hall", "neither a light nor an emissive mesh"});
+
+    LevelFile dull = LevelFile::withFloor();
+    dull.node(0)["extras"] = {{"dimmer_light_set", "hall"}};
+    expectBadInput(dull.import(), {"node 'floor'", "hall", "emission"});
+
+    LevelFile dull_mesh = LevelFile::withFloor();
+    dull_mesh.document["meshes"][0]["extras"] = {{"dimmer_light_set", "hall"}};
+    expectBadInput(dull_mesh.import(), {"node 'floor'", "mesh 0", "hall"});
+}
+
+TEST(SceneElements, MaxWeightMustBePositive) {
+    for (const json& bad : {json(0), json(-1), json("2"), json(1e39), json(1e-60)})
+        expectBadInput(levelWithLamp({{"dimmer_light_set", "hall"}, {"dimmer_max_weight", bad}}).import(),
+                       {"node 'lamp'", "dimmer_max_weight"});
+    const auto scene = levelWithLamp({{"dimmer_max_weight", 2}}).import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'lamp'", "dimmer_max_weight"});
+}
+
+TEST(SceneElements, DoorsReachDownTheTreeAndJoinByName) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(0);
+    const int hinge = level.addNode({{"name", "hinge"}, {"extras", {{"dimmer_door", "front"}}}});
+    const int leaf = level.addNode({{"name", "leaf"}, {"mesh", mesh}}, hinge);
+    level.addNode({{"name", "handle"}, {"mesh", mesh}}, leaf);
+    level.addNode({{"name", "cat_flap"}, {"mesh", mesh}, {"extras", {{"dimmer_door", "flap"}}}}, leaf);
+    level.addNode({{"name", "other_leaf"}, {"mesh", mesh}, {"extras", {{"dimmer_door", "front"}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->doors.size(), 2u);
+    EXPECT_EQ(scene->doors[0].name, "front");
+    EXPECT_FALSE(scene->doors[0].pose);
+    ASSERT_EQ(scene->meshes.size(), 5u);
+    EXPECT_FALSE(scene->meshes[0].door);
+    EXPECT_EQ(scene->meshes[1].door, 0u);
+    EXPECT_EQ(scene->meshes[2].door, 0u);
+    EXPECT_EQ(scene->meshes[3].door, 1u);  // the nearest name wins
+    EXPECT_EQ(scene->meshes[4].door, 0u);
+}
+
+TEST(SceneElements, OpenPose) {
+    LevelFile level = LevelFile::withFloor();
+    json extras = {{"dimmer_door", "front"},
+                   {"dimmer_door_open", "pose"},
+                   {"dimmer_door_rotation", {0, 2, 0, 2}},
+                   {"dimmer_door_translation", {0.5, 0, 1}}};
+    const int door = level.addNode({{"name", "leaf"}, {"mesh", level.addSquareMesh(0)}, {"extras", extras}});
+    auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_TRUE(scene->doors[0].pose);
+    EXPECT_FLOAT_EQ(scene->doors[0].open_rotation.y, std::sqrt(0.5f));  // normalised
+    EXPECT_FLOAT_EQ(scene->doors[0].open_rotation.w, std::sqrt(0.5f));
+    EXPECT_EQ(scene->doors[0].open_translation_m, glm::vec3(0.5f, 0, 1));
+
+    level.node(door)["extras"].erase("dimmer_door_open");
+    scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'leaf'", "front", "dimmer_door_open"});
+
+    for (const json& bad : {json{0, 0, 0, 0}, json{0, 1, 0}, json{0, "a", 0, 1}, json("left")}) {
+        level.node(door)["extras"]["dimmer_door_rotation"] = bad;
+        expectBadInput(level.import(), {"node 'leaf'", "dimmer_door_rotation"});
+    }
+}
+
+TEST(SceneElements, NodesOfADoorMustAgreeHowItOpens) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(0);
+    for (const char* open : {"remove", "pose"})
+        level.addNode({{"name", std::string("leaf_") + open},
+                       {"mesh", mesh},
+                       {"extras", {{"dimmer_door", "front"}, {"dimmer_door_open", open}}}});
+    expectBadInput(level.import(), {"node 'leaf_pose'", "node 'leaf_remove'", "front"});
+}
+
+TEST(SceneElements, ADoorNeedsGeometry) {
+    LevelFile level = LevelFile::withFloor();
+    const int door = level.addNode({{"name", "frame"}, {"extras", {{"dimmer_door", "front"}}}});
+    expectBadInput(level.import(), {"node 'frame'", "door 'front'", "no geometry"});
+    // A mesh that moves by itself does not make a leaf.
+    level.addNode({{"name", "bell"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_dynamic", true}}}}, door);
+    expectBadInput(level.import(), {"node 'frame'", "door 'front'", "no geometry"});
+}
+
+TEST(SceneElements, SetsAndDoorsHaveSeparateNames) {
+    LevelFile level = levelWithLamp({{"dimmer_light_set", "plat1"}});
+    level.addNode({{"name", "lift"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", "plat1"}}}});
+    level.document["scenes"][0]["extras"]["dimmer_combinations"] = {{"door:plat1", "plat1"}, {"door:plat1"}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->light_sets.size(), 1u);
+    EXPECT_EQ(scene->doors.size(), 1u);
+    ASSERT_EQ(scene->combinations.size(), 2u);
+    ASSERT_EQ(scene->combinations[0].size(), 2u);
+    EXPECT_TRUE(scene->combinations[0][0].is_door);
+    EXPECT_EQ(scene->combinations[0][0].index, 0u);
+    EXPECT_FALSE(scene->combinations[0][1].is_door);
+}
+
+TEST(SceneElements, CombinationsOfUnknownElementsAreRefused) {
+    LevelFile level = levelWithLamp({{"dimmer_light_set", "hall"}});
+    level.addNode({{"name", "leaf"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", "front"}}}});
+    json& combinations = level.document["scenes"][0]["extras"]["dimmer_combinations"];
+    combinations = json::array({json::array({"door:back", "hall"})});
+    expectBadInput(level.import(), {"dimmer_combinations", "door:back"});
+    combinations = json::array({json::array({"front", "hall"})});
+    // A name of a door without its prefix gets a hint.
+    expectBadInput(level.import(), {"dimmer_combinations", "write 'door:front'"});
+    for (const json& bad : {json("front"), json{1, 2}, json{"front"}, json::array({json::array({"door:front", 1})})}) {
+        combinations = bad;
+        expectBadInput(level.import(), {"dimmer_combinations", "list of lists"});
+    }
+}
+
+TEST(SceneElements, NamesThatAStateCannotSayAreRefused) {
+    for (const char* name : {"", "a,b", "a=b", "all", "door:x"})
+        expectBadInput(levelWithLamp({{"dimmer_light_set", name}}).import(), {"node 'lamp'", name});
+}
+
+TEST(SceneElements, UnknownKeysGetTheNearestKnownOne) {
+    LevelFile level = levelWithLamp({{"dimmer_lightset", "hall"}, {"dimer_bake", 1}, {"quake_wait", 2}});
+    level.document["materials"][0]["extras"] = {{"dimmer_sky_color", {1, 1, 1}}};
+    level.document["scenes"][0]["extras"] = {{"dimmer_sky_colour", {1, 1, 1}}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 3u);
+    expectWarning(*scene, {"node 'lamp'", "'dimmer_lightset'", "'dimmer_light_set'"});
+    expectWarning(*scene, {"material 'white'", "'dimmer_sky_color'", "belongs in the extras of the scene"});
+    expectWarning(*scene, {"scene", "'dimmer_sky_colour'", "'dimmer_sky_color'"});
+}
+
+TEST(SceneElements, WrongTypesNameNodeAndKey) {
+    const std::pair<const char*, json> cases[] = {
+        {"dimmer_door", 1},         {"dimmer_lighting", "lightmaps"}, {"dimmer_dynamic", 2},
+        {"dimmer_dynamic", "yes"},  {"dimmer_texel_density", "8"},    {"dimmer_texel_density", -8},
+        {"dimmer_grid_spacing", 0}, {"dimmer_play_area", "big"},      {"dimmer_light_set", 3}};
+    for (const auto& [key, value] : cases) {
+        LevelFile level = LevelFile::withFloor();
+        level.node(0)["extras"] = {{key, value}};
+        expectBadInput(level.import(), {"node 'floor'", key});
+    }
+}
+
+TEST(SceneElements, HowMeshesReceiveLight) {
+    const std::pair<json, Lighting> cases[] = {{{{"dimmer_lighting", "lightmap"}}, Lighting::Lightmap},
+                                               {{{"dimmer_lighting", "local_grid"}}, Lighting::LocalGrid},
+                                               {{{"dimmer_lighting", "dynamic"}}, Lighting::Dynamic},
+                                               {{{"dimmer_lighting", "none"}}, Lighting::None},
+                                               {{{"dimmer_dynamic", 1}}, Lighting::Dynamic},
+                                               {{{"dimmer_dynamic", 1.0}}, Lighting::Dynamic},
+                                               {{{"dimmer_dynamic", true}}, Lighting::Dynamic},
+                                               {{{"dimmer_dynamic", false}}, Lighting::Automatic},
+                                               {{{"dimmer_dynamic", 0}}, Lighting::Automatic}};
+    for (const auto& [extras, lighting] : cases) {
+        LevelFile level = LevelFile::withFloor();
+        level.node(0)["extras"] = extras;
+        level.node(0)["extras"]["dimmer_texel_density"] = 16;
+        level.node(0)["extras"]["dimmer_grid_spacing"] = 0.5;
+        const auto scene = level.import();
+        ASSERT_IMPORTED(scene);
+        EXPECT_EQ(scene->meshes[0].lighting, lighting) << extras;
+        EXPECT_EQ(scene->meshes[0].texels_per_metre, 16.0f);
+        EXPECT_EQ(scene->meshes[0].grid_spacing_m, 0.5f);
+        EXPECT_TRUE(scene->dynamic_places_m.empty());
+    }
+    LevelFile contradiction = LevelFile::withFloor();
+    contradiction.node(0)["extras"] = {{"dimmer_dynamic", 1}, {"dimmer_lighting", "lightmap"}};
+    expectBadInput(contradiction.import(), {"node 'floor'", "dimmer_dynamic", "dimmer_lighting"});
+}
+
+TEST(SceneElements, EmptyNodesArePlacesAndPlayAreasAreNoGeometry) {
+    LevelFile level = LevelFile::withFloor();
+    level.addNode({{"name", "barrel_place"}, {"translation", {1, 2, 3}}, {"extras", {{"dimmer_dynamic", 1}}}});
+    level.addNode({{"name", "area"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_play_area", 1}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->dynamic_places_m.size(), 1u);
+    EXPECT_EQ(scene->dynamic_places_m[0], glm::vec3(1, 2, 3));
+    EXPECT_EQ(scene->meshes.size(), 1u);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

@@ -1,0 +1,192 @@
+#include <scene/expectations.h>
+#include <stb/stb_image_write.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace dimmer::cook::test {
+namespace {
+
+std::vector<uint8_t> png(int width, int height, const std::vector<uint8_t>& rgba) {
+    std::vector<uint8_t> bytes;
+    const auto append = [](void* to, void* data, int size) {
+        const auto* first = static_cast<const uint8_t*>(data);
+        static_cast<std::vector<uint8_t>*>(to)->insert(static_cast<std::vector<uint8_t>*>(to)->end(), first,
+                                                       first + size);
+    };
+    stbi_write_png_to_func(append, &bytes, width, height, 4, rgba.data(), width * 4);
+    return bytes;
+}
+
+// Adds a texture of an embedded 2 x 1 image and returns its index.
+int addTexture(LevelFile& level, const std::vector<uint8_t>& rgba) {
+    const std::vector<uint8_t> bytes = png(2, 1, rgba);
+    level.document["images"].push_back(
+        {{"name", "picture"}, {"bufferView", level.addView(bytes.data(), bytes.size())}, {"mimeType", "image/png"}});
+    level.document["textures"].push_back({{"source", level.document["images"].size() - 1}});
+    return static_cast<int>(level.document["textures"].size()) - 1;
+}
+
+// A level whose square "poster" has the texture and coordinates 0..1.
+LevelFile levelWithPoster(const json& texture_info, const std::vector<uint8_t>& rgba) {
+    LevelFile level = LevelFile::withFloor();
+    json info = texture_info;
+    info["index"] = addTexture(level, rgba);
+    const int material = level.addMaterial(
+        {{"name", "picture"}, {"pbrMetallicRoughness", {{"baseColorTexture", info}, {"metallicFactor", 0}}}});
+    const int mesh = level.addSquareMesh(material);
+    level.primitive(mesh)["attributes"]["TEXCOORD_0"] = level.addVec2({{0, 1}, {1, 1}, {1, 0}, {0, 0}});
+    level.primitive(mesh)["attributes"]["TEXCOORD_2"] = level.addVec2({{0, 0}, {0, 0}, {0.25, 0.5}, {0, 0}});
+    level.addNode({{"name", "poster"}, {"mesh", mesh}});
+    return level;
+}
+
+const std::vector<uint8_t> red_and_grey = {255, 0, 0, 255, 188, 188, 188, 51};
+
+TEST(SceneMaterials, ReflectanceOfDielectricsAndMetals) {
+    // scene.md: rs = s (0.04 + 0.96 / 21) = 0.0857142857 for a dielectric; rho = c (1 - rs) + rs.
+    Material material;
+    expectNear(material.reflectance({0, 0.5f, 0.8f}), {0.085714286f, 0.542857143f, 0.817142857f}, 1e-6f);
+    material.specular = 0;
+    expectNear(material.reflectance({0, 0.5f, 0.8f}), {0, 0.5f, 0.8f}, 1e-6f);
+    // A metal reflects its base colour; half a metal: c = 0.25, rs = (0.0857142857 + 0.5) / 2.
+    material.specular = 1;
+    material.metallic = 1;
+    expectNear(material.reflectance({0, 0.5f, 0.8f}), {0, 0.5f, 0.8f}, 1e-6f);
+    material.metallic = 0.5f;
+    const float rs = (0.0857142857f + 0.5f) / 2;
+    EXPECT_NEAR(material.reflectance(glm::vec3(0.5f)).x, 0.25f * (1 - rs) + rs, 1e-6f);
+    material.metallic = 0;
+    EXPECT_EQ(material.reflectance(glm::vec3(1)).x, 0.99f);
+}
+
+TEST(SceneMaterials, FactorsAndExtensions) {
+    LevelFile level = LevelFile::withFloor();
+    level.addMaterial({{"name", "window"},
+                       {"pbrMetallicRoughness", {{"baseColorFactor", {0.1, 0.2, 0.3, 0.4}}, {"metallicFactor", 0.25}}},
+                       {"alphaMode", "BLEND"},
+                       {"doubleSided", true},
+                       {"emissiveFactor", {1, 0.5, 0}},
+                       {"extensions",
+                        {{"KHR_materials_emissive_strength", {{"emissiveStrength", 200}}},
+                         {"KHR_materials_specular", {{"specularFactor", 0.5}}}}}});
+    level.addMaterial({{"alphaMode", "MASK"}, {"alphaCutoff", 0.3}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    const Material& window = scene->materials[1];
+    EXPECT_EQ(window.name, "window");
+    expectNear(window.base_color, {0.1f, 0.2f, 0.3f});
+    EXPECT_FLOAT_EQ(window.alpha, 0.4f);
+    EXPECT_EQ(window.metallic, 0.25f);
+    EXPECT_EQ(window.specular, 0.5f);
+    EXPECT_EQ(window.alpha_mode, AlphaMode::Blend);
+    EXPECT_TRUE(window.double_sided);
+    expectNear(window.emission_cd_m2, {200, 100, 0});
+    const Material& mask = scene->materials[2];
+    EXPECT_EQ(mask.alpha_mode, AlphaMode::Mask);
+    EXPECT_FLOAT_EQ(mask.alpha_cutoff, 0.3f);
+    EXPECT_EQ(mask.metallic, 1.0f);  // glTF's default
+    EXPECT_FALSE(mask.double_sided);
+}
+
+TEST(SceneMaterials, FactorsOutsideTheirRange) {
+    LevelFile level = LevelFile::withFloor();
+    level.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {1.5, 0.5, 0.5, 1};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->materials[0].base_color.x, 1.0f);
+    expectWarning(*scene, {"material 'white'", "baseColorFactor", "clamped"});
+
+    const std::pair<const char*, json> bad[] = {{"emissiveFactor", {1, -1, 0}},
+                                                {"emissiveFactor", {1e39, 0, 0}},
+                                                {"alphaMode", "GLASS"},
+                                                {"alphaCutoff", 1e39}};
+    for (const auto& [key, value] : bad) {
+        LevelFile refused = LevelFile::withFloor();
+        refused.document["materials"][0][key] = value;
+        SCOPED_TRACE(key);
+        expectBadInput(refused.import(), {"material 'white'"});
+    }
+    LevelFile refused = LevelFile::withFloor();
+    refused.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.5, 1e39, 0.5, 1};
+    expectBadInput(refused.import(), {"material 'white'", "baseColorFactor"});
+}
+
+TEST(SceneMaterials, TexturesBecomeLinear) {
+    const auto scene = levelWithPoster(json::object(), red_and_grey).import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->images.size(), 1u);
+    EXPECT_EQ(scene->materials[1].base_color_image, 0u);
+    const Image& image = scene->images[0];
+    EXPECT_EQ(image.width, 2u);
+    EXPECT_EQ(image.height, 1u);
+    expectNear(glm::vec3(image.texels[0]), {1, 0, 0});
+    // IEC 61966-2-1: 188/255 = 0.737255 -> ((0.737255 + 0.055) / 1.055)^2.4 = 0.502886; alpha is linear.
+    expectNear(glm::vec3(image.texels[1]), glm::vec3(0.502886f), 1e-5f);
+    EXPECT_FLOAT_EQ(image.texels[1].a, 0.2f);
+    EXPECT_EQ(scene->meshes[1].uv0[1], glm::vec2(1, 1));
+}
+
+TEST(SceneMaterials, SamplingIsBilinearAndRepeats) {
+    const Image image{2, 2, {glm::vec4(0), glm::vec4(1), glm::vec4(2), glm::vec4(3)}};
+    EXPECT_FLOAT_EQ(image.sample({0.25f, 0.25f}).x, 0);  // texel centres
+    EXPECT_FLOAT_EQ(image.sample({0.75f, 0.25f}).x, 1);
+    EXPECT_FLOAT_EQ(image.sample({0.25f, 0.75f}).x, 2);
+    EXPECT_FLOAT_EQ(image.sample({0.5f, 0.5f}).x, 1.5f);
+    EXPECT_FLOAT_EQ(image.sample({0.375f, 0.25f}).x, 0.25f);
+    EXPECT_FLOAT_EQ(image.sample({0, 0.25f}).x, 0.5f);  // between the last column and the first
+    EXPECT_FLOAT_EQ(image.sample({-0.25f, 0.25f}).x, 1);
+    EXPECT_FLOAT_EQ(image.sample({7.75f, -3.25f}).x, 3);
+    EXPECT_TRUE(std::isfinite(image.sample({INFINITY, NAN}).x));
+    EXPECT_TRUE(std::isfinite(image.sample({1e30f, -1e-30f}).x));
+}
+
+TEST(SceneMaterials, TextureTransformAndSet) {
+    // rotation 90 degrees: (u, v) -> (v, -u), scaled before, moved after.
+    const json transform = {{"offset", {0.5, 0.25}}, {"rotation", std::numbers::pi / 2}, {"scale", {2, 4}}};
+    auto scene = levelWithPoster({{"extensions", {{"KHR_texture_transform", transform}}}}, red_and_grey).import();
+    ASSERT_IMPORTED(scene);
+    const glm::vec2 corner = scene->meshes[1].uv0[1];  // of (1, 1)
+    EXPECT_NEAR(corner.x, 4.5f, 1e-5f);
+    EXPECT_NEAR(corner.y, -1.75f, 1e-5f);
+
+    scene = levelWithPoster({{"texCoord", 2}}, red_and_grey).import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->meshes[1].uv0[2], glm::vec2(0.25f, 0.5f));
+
+    scene = levelWithPoster({{"texCoord", 7}}, red_and_grey).import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'poster'", "TEXCOORD_7"});
+}
+
+TEST(SceneMaterials, EmissiveAndMetalTexturesCountWithTheirMean) {
+    LevelFile level = LevelFile::withFloor();
+    const int texture = addTexture(level, {255, 0, 0, 255, 0, 0, 255, 255});
+    level.addMaterial({{"name", "screen"}, {"emissiveFactor", {4, 4, 4}}, {"emissiveTexture", {{"index", texture}}}});
+    level.addMaterial(
+        {{"name", "half"}, {"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", texture}}}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectNear(scene->materials[1].emission_cd_m2, {2, 0, 2});
+    EXPECT_FLOAT_EQ(scene->materials[2].metallic, 0.5f);  // blue channel
+    expectWarning(*scene, {"material 'screen'", "emissive"});
+    expectWarning(*scene, {"material 'half'", "metalness"});
+}
+
+TEST(SceneMaterials, UnusableImagesAreRefused) {
+    LevelFile level = levelWithPoster(json::object(), red_and_grey);
+    json& image = level.document["images"][0];
+    const json good = image;
+    const auto view = image["bufferView"].get<size_t>();
+    image = {{"name", "picture"}, {"uri", "nowhere.png"}};
+    expectBadInput(level.import(), {"material 'picture'", "nowhere.png"});
+    image = {{"name", "picture"}, {"uri", "data:image/png;base64,AAAAAAAAAAAAAAAA"}};
+    expectBadInput(level.import(), {"material 'picture'", "neither PNG nor JPEG"});
+    image = good;
+    level.document["bufferViews"][view]["byteLength"] = 40;  // ends inside the header of the pixels
+    expectBadInput(level.import(), {"material 'picture'", "damaged"});
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
