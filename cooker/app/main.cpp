@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
     addCookCommand(app, exit_code);
     addInspectCommand(app, exit_code);
     addSampleCommand(app, exit_code);
+    addBenchCommand(app, exit_code);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

@@ -13,8 +13,6 @@ namespace {
 // Planes and lines are told apart at these steps: finer than any texel, coarser than 32-bit coordinates at 100 m.
 constexpr float normal_steps = 512, offset_steps_per_m = 128, direction_steps = 2048;
 constexpr float touching_m = 1e-3f;
-// Rays that look for walls between two parts of a chart run this high above the surface.
-constexpr float wall_probe_height_m = 0.01f;
 // Bilinear filtering and padding reach this far.
 constexpr float filter_reach_texels = 2;
 // A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
@@ -201,7 +199,10 @@ class PlaneGrouper {
                      const std::function<bool(glm::vec3, glm::vec3)>& blocked) const {
         const PlanarFace& fa = all_[ids_[a]];
         const PlanarFace& fb = all_[ids_[b]];
-        const glm::vec3 lift = fa.normal * wall_probe_height_m;
+        auto wallAt = [&](glm::vec3 p, glm::vec3 q, float height_m) {
+            const glm::vec3 lift = fa.normal * height_m;
+            return blocked(p + lift, q + lift) || blocked(q + lift, p + lift);
+        };
         const glm::vec3 middle = (fa.corners_m[0] + fa.corners_m[1] + fa.corners_m[2]) / 3.0f;
         for (size_t e = 0; e < 3; ++e)
             for (float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
@@ -211,9 +212,9 @@ class PlaneGrouper {
                 if (distance < touching_m || distance > reach) continue;
                 // Step off the edges, on which the wall itself may stand.
                 const glm::vec3 middle_b = (fb.corners_m[0] + fb.corners_m[1] + fb.corners_m[2]) / 3.0f;
-                p += 0.01f * (middle - p) + lift;
-                q += 0.01f * (middle_b - q) + lift;
-                if (blocked(p, q) || blocked(q, p)) return true;
+                p += 0.01f * (middle - p);
+                q += 0.01f * (middle_b - q);
+                if (wallAt(p, q, wall_probe_low_m) && wallAt(p, q, wall_probe_high_m)) return true;
             }
         return false;
     }

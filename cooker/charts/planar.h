@@ -8,6 +8,10 @@
 
 namespace dimmer::cook {
 
+// What parts two places of a plane is looked for at these heights above it: a wall stands at both, furniture against a
+// wall, a skirting board or a window's frame do not reach the second.
+inline constexpr float wall_probe_low_m = 0.01f, wall_probe_high_m = 0.8f;
+
 struct PlanarFace {
     std::array<glm::vec3, 3> corners_m;  // counter-clockwise seen from the lit side
     glm::vec3 normal;

@@ -12,7 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float probe_height_m = 0.01f;  // walls are looked for this high above the plane
 constexpr float same_line_m = 2e-3f;
 constexpr float reach_texels = 2.5f;    // thinner than this leaks: bilinear filtering plus half a texel of averaging
 constexpr float length_min_texels = 3;  // a table's leg is no wall
@@ -131,7 +130,8 @@ class WallCutter {
     // Where pairs of surfaces, back to back and close together, stand on the chart's plane.
     std::vector<Cut> findCuts(const PlanarChart& chart) const {
         const float reach_m = reach_texels / chart.texels_per_metre;
-        const std::vector<Trace> traces = findTraces(chart);
+        const std::vector<Trace> traces =
+            standing(findTraces(chart, wall_probe_low_m), findTraces(chart, wall_probe_high_m));
         std::vector<Cut> cuts;
         for (const Trace& a : traces)
             for (const Trace& b : traces) {
@@ -144,9 +144,21 @@ class WallCutter {
         return joinCuts(std::move(cuts));
     }
 
-    std::vector<Trace> findTraces(const PlanarChart& chart) const {
+    // What is there at both heights.
+    static std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Trace>& high) {
+        std::vector<Trace> both;
+        for (const Trace& a : low)
+            for (const Trace& b : high) {
+                if (a.axis != b.axis || a.forward != b.forward || std::abs(a.at - b.at) > same_line_m) continue;
+                const Trace t{a.axis, a.at, std::max(a.from, b.from), std::min(a.to, b.to), a.forward};
+                if (t.to - t.from > same_line_m) both.push_back(t);
+            }
+        return both;
+    }
+
+    std::vector<Trace> findTraces(const PlanarChart& chart, float height_m) const {
         const PlanarFace& any = faces_[chart.faces[0]];
-        const float height = glm::dot(any.normal, any.corners_m[0]) + probe_height_m;
+        const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
         const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
         std::vector<Trace> traces;
         for (uint32_t f = 0; f < faces_.size(); ++f) {

@@ -135,9 +135,6 @@ def shell():
         solids.air(box, "windows")
         solids.solid(middle_bar(box), "window_bars")
     solids.air((*STAIR_X, LOWER[1], UPPER[0], STAIR_HEAD_Z, 7.2), "stairwell")
-    for step in range(1, TREADS + 1):
-        far = STAIR_FOOT_Z - TREAD * step
-        solids.solid((*STAIR_X, 0.0, round(RISE * step, 3), far, far + TREAD), "stairs")
     return solids
 
 
@@ -154,8 +151,7 @@ SIDE_OF_NORMAL = {(0, 1): "west", (0, -1): "east", (2, 1): "north", (2, -1): "so
 
 def shell_surface(label, region, axis, sign):
     """(node name, material, texels per metre or None) of the shell's faces with that normal."""
-    by_label = {"ground": (GRASS, 1), "front_step": (CONCRETE, None), "stairs": (PINE, None),
-                "window_bars": (LACQUER, None)}
+    by_label = {"ground": (GRASS, 1), "front_step": (CONCRETE, None), "window_bars": (LACQUER, None)}
     if label:
         return label, *by_label[label]
     if region in ROOMS:
@@ -254,7 +250,18 @@ def add_kitchen(gltf):
               [(2.2, 3.4, 2.56, 2.6, 2.2, 2.5)], room, extras={"dimmer_light_set": "kitchen"})
 
 
+def add_stairs(gltf):
+    """Stands before an unbroken wall and floor, as furniture does: they would fall into strips if it were cut in."""
+    steps = []
+    for step in range(1, TREADS + 1):
+        far = round(STAIR_FOOT_Z - TREAD * step, 4)
+        steps.append((*STAIR_X, 0.0, round(RISE * step, 4), far, round(far + TREAD, 4)))
+    hall = room_box("hall")
+    add_boxes(gltf, "stairs", PINE, steps, (*hall[:3], UPPER[0], *hall[4:]), extras={"dimmer_lighting": "lightmap"})
+
+
 def add_ground_floor(gltf):
+    add_stairs(gltf)
     add_living(gltf)
     add_kitchen(gltf)
     hall, cellar, den, corridor = (room_box(name) for name in ("hall", "cellar", "den", "corridor"))

@@ -5,6 +5,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <cstring>
 
 namespace dimmer {

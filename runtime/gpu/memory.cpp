@@ -3,6 +3,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <array>
 #include <optional>
 
 namespace dimmer {

@@ -4,6 +4,7 @@
 #include <dimmer/light_state.h>
 #include <pack/pack_data.h>
 
+#include <algorithm>
 #include <array>
 #include <dimmer/work_list.glsl>
 #include <span>

@@ -30,7 +30,8 @@ struct Weight {
 };
 
 // Not thread-safe: call from one thread at a time. Nothing here touches a GPU; a change costs nanoseconds and takes
-// effect with the runtime's next update. At the start every set has weight 1 and every door is closed.
+// effect with the runtime's next update. At the start every set has weight 1 (its maximum, where that is
+// smaller) and every door is closed.
 class LightState {
    public:
     ~LightState();

@@ -40,6 +40,7 @@ class Runtime : public LightState {
    public:
     // Uploads the pack's records and the base pages (blocking). Device memory: what `dimmer inspect` states.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
+    // Waits for what submit() sent; what was record()ed must have completed, as for any Vulkan object.
     ~Runtime();
     Runtime(Runtime&&) noexcept;
     Runtime& operator=(Runtime&&) noexcept;
@@ -56,7 +57,8 @@ class Runtime : public LightState {
     // The timeline semaphore of submit() and the value that its last submission signals.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
-    // Blocks until what submit() sent is done. Statistics of the last update, GPU time included.
+    // Blocks until what submit() sent is done. Statistics of the last update, GPU time included; after record(), call
+    // it once the commands have completed.
     Expected<UpdateStats> wait();
 
     LightmapImages images() const;
