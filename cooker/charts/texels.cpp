@@ -18,6 +18,8 @@ constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
+// Bilinear filtering needs one ring around what is lit; the second covers texels of which only a corner is visible.
+constexpr int fill_rings = 2;
 
 struct Covered {
     uint64_t texel;  // index over all pages
@@ -121,18 +123,17 @@ class TexelSampler {
         if (dropped && result.points.size() > 1) keepOneSideOfWalls(result.points);
     }
 
-    // A point in a closed solid sees its back faces wherever it looks. One ray decides the common case.
+    // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
+    // none; more than one, because where solids touch, a ray may as well report the neighbour's front.
     bool insideGeometry(glm::vec3 position, uint32_t face) const {
         const TangentFrame& f = unwrap_.frames[face];
-        auto seesBack = [&](glm::vec3 direction) {
-            const auto hit = rays_.nearest(position, direction, 1e30f, 0);
-            return hit && hit->back && !doubleSided(hit->triangle);
-        };
-        if (!seesBack(f.normal)) return false;
-        uint32_t backs = 1;
-        for (uint32_t i = 1; i < inside_test_rays; ++i) {
+        uint32_t backs = 0;
+        for (uint32_t i = 0; i < inside_test_rays; ++i) {
+            if (i == inside_test_rays / 4 && backs == 0) return false;
             const glm::vec3 d = cosineDirection(sequence2d(i, face));
-            backs += seesBack(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
+            const glm::vec3 direction = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
+            const auto hit = rays_.nearest(position, direction, 1e30f, 0);
+            backs += hit && hit->back && !doubleSided(hit->triangle);
         }
         return 2 * backs > inside_test_rays;
     }
@@ -158,7 +159,8 @@ class TexelSampler {
     uint32_t samples_max_;
 };
 
-// Every other texel of a chart's rectangle takes the nearest receiver of the chart, found ring by ring.
+// Every other texel of a chart's rectangle takes the nearest receiver of the chart, found ring by ring. What is stored
+// for display ends after a few rings: deeper inside solids nobody looks, and it stays black there.
 void standIn(const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& out) {
     auto index = [&](uint32_t page, uint32_t x, uint32_t y) {
         return (size_t{page} * unwrap.page_height + y) * unwrap.page_width + x;
@@ -178,7 +180,7 @@ void standIn(const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& 
                     if (covered[index(c.page, nx, ny)]) return true;
             return false;
         };
-        while (!front.empty()) {
+        for (int ring = 1; !front.empty(); ++ring) {
             next.clear();
             for (auto [x, y] : front)
                 for (auto [dx, dy] : neighbours) {
@@ -189,7 +191,7 @@ void standIn(const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& 
                     if (receiver != no_index) continue;
                     receiver = out.receiver_at[index(c.page, x, y)];
                     next.push_back({nx, ny});
-                    if (needed(nx, ny)) out.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
+                    if (ring <= fill_rings && needed(nx, ny)) out.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
                 }
             front.swap(next);
         }

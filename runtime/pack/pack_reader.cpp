@@ -16,8 +16,8 @@ using format::ByteReader;
 using format::Chunk;
 using format::ChunkType;
 
-// zstd can expand a few bytes to almost anything; records of light never compress that well, an empty page nearly so.
-constexpr uint64_t expansion_max = 4096;
+// An empty page is one repeated byte: zstd stores each block of 128 KiB of it in 4 bytes, and can do no better.
+constexpr uint64_t expansion_max = 128 * 1024 / 3;
 
 template <class... Args>
 std::unexpected<Error> bad(fmt::format_string<Args...> text, Args&&... args) {
