@@ -1,9 +1,9 @@
 #include <bake/bake.h>
 
+#include <bake/denoise.h>
 #include <bake/direct.h>
+#include <bake/final_gather.h>
 #include <bake/sampling.h>
-
-#include <tbb/enumerable_thread_specific.h>
 
 #include <atomic>
 #include <cmath>
@@ -15,6 +15,8 @@ namespace {
 // Bounced light of a set below this share of its activity threshold does not bounce on: with the usual threshold of
 // 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss.
 constexpr float lingering_share = 0.01f;
+// Light below this share of its group's mean need not be exact to a share of itself: the error metric's own floor.
+constexpr float noise_floor = 0.01f;
 
 class Baker {
    public:
@@ -45,15 +47,13 @@ class Baker {
         return groups;
     }
 
-    // `least`, when not empty, leaves out what is fainter than that, per group.
-    static void emitRow(GroupAccumulator<Gathered>& sum, std::span<const float> least, std::vector<GroupLight>& row,
-                        auto& emit) {
+    // Moves `sum` to a row. `least`, when not empty, leaves out what is fainter than that, per group.
+    static void takeRow(GroupAccumulator<Gathered>& sum, std::span<const float> least, std::vector<GroupLight>& row) {
         row.clear();
         for (uint32_t g : sum.touched())
             if (least.empty() || luminance(sum[g].irradiance_lux) >= least[g])
                 row.push_back({g, sum[g].irradiance_lux});
         sum.clear();
-        emit(std::span<const GroupLight>(row));
     }
 
     // What surfaces reflect at the first bounce: punctual light, emitters and the sky. The rays that look for emitters
@@ -61,31 +61,38 @@ class Baker {
     void directPass() {
         progress_.stage("direct light and links", texels_.size());
         links_.assign(texels_.size() * settings_.series_rays, no_index);
-        std::vector<std::vector<ReceiverLight>> stored(texels_.size());
-        std::vector<std::vector<GroupLight>> left_out(texels_.size());
-        const GatherOptions options{settings_.series_rays, settings_.emitter_samples, settings_.seed};
-        direct_ = SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
+        const GatherOptions options{
+            .rays = settings_.series_rays, .emitter_samples = settings_.emitter_samples, .seed = settings_.seed};
+        SparseLight::Builder direct(texels_.size()), left_to_renderer(texels_.size());
+        Sparse<ReceiverLight>::Builder stored(texels_.size());
+        forEachBlock(texels_.size(), [&](size_t begin, size_t end) {
             GroupAccumulator<Gathered> sum(groups_), full(groups_);
-            std::vector<GroupLight> row;
+            std::vector<GroupLight> row, left_row;
+            std::vector<ReceiverLight> stored_row;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
                 traced += directLight(rays_, unwrap_, texels_, i, sum, full) + options.rays;
-                for (uint32_t g : sum.touched())
-                    left_out[i].push_back({g, sum[g].irradiance_lux - full[g].irradiance_lux});
-                gatherer_.gather(i, options, nullptr, sum, &links_[i * settings_.series_rays]);
-                for (uint32_t g : full.touched()) stored[i].push_back({g, full[g]});
+                left_row.clear();
+                for (uint32_t g : sum.touched()) {
+                    const glm::vec3 left = sum[g].irradiance_lux - full[g].irradiance_lux;
+                    if (luminance(left) > 0) left_row.push_back({g, left});
+                }
+                stored_row.clear();
+                for (uint32_t g : full.touched())
+                    if (luminance(full[g].irradiance_lux) > 0) stored_row.push_back({g, full[g]});
                 full.clear();
-                emitRow(sum, {}, row, emit);
+                gatherer_.gather(i, options, nullptr, sum, &links_[i * settings_.series_rays]);
+                takeRow(sum, {}, row);
+                direct.put(i, row);
+                left_to_renderer.put(i, left_row);
+                stored.put(i, stored_row);
             }
             rays_traced_ += traced;
             progress_.advance(end - begin);
         });
-        stored_direct_ = Sparse<ReceiverLight>::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            for (size_t i = begin; i < end; ++i) emit(std::span<const ReceiverLight>(stored[i]));
-        });
-        left_to_renderer_ = SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            for (size_t i = begin; i < end; ++i) emit(std::span<const GroupLight>(left_out[i]));
-        });
+        direct_ = direct.finish();
+        left_to_renderer_ = left_to_renderer.finish();
+        stored_direct_ = stored.finish();
     }
 
     // What leaves each receiver: rho / pi * (direct + bounced so far).
@@ -97,7 +104,8 @@ class Baker {
                 const glm::vec3 reflect = texels_.reflectance[i] / pi;
                 for (const auto* part : {&direct_, &bounced})
                     for (const GroupLight& l : part->row(i)) sum[l.group].irradiance_lux += reflect * l.value;
-                emitRow(sum, {}, row, emit);
+                takeRow(sum, {}, row);
+                emit(std::span<const GroupLight>(row));
             }
         });
     }
@@ -115,7 +123,8 @@ class Baker {
                     for (const GroupLight& l : radiance.row(from))
                         sum[l.group].irradiance_lux += lux_per_radiance * l.value;
                 }
-                emitRow(sum, least_, row, emit);
+                takeRow(sum, least_, row);
+                emit(std::span<const GroupLight>(row));
             }
         });
     }
@@ -167,11 +176,11 @@ class Baker {
             ++reports[group].lit_directly;
             indirect[group] += static_cast<double>(bounced);
         });
-        for (uint32_t g = 1; g < groups_; ++g) {
+        for (uint32_t g = 0; g < groups_; ++g) {
             GroupReport& report = reports[g];
-            if (report.lit_directly > 0)
-                report.threshold_lux =
-                    settings_.threshold * static_cast<float>(indirect[g] / static_cast<double>(report.lit_directly));
+            if (report.lit_directly == 0) continue;
+            report.mean_indirect_lux = static_cast<float>(indirect[g] / static_cast<double>(report.lit_directly));
+            if (g != always_group) report.threshold_lux = settings_.threshold * report.mean_indirect_lux;
         }
         return reports;
     }
@@ -220,40 +229,59 @@ class Baker {
         }
     }
 
-    void activeGroups(size_t receiver, std::vector<uint8_t>& flags) const {
-        std::ranges::fill(flags, uint8_t{0});
-        flags[always_group] = 1;
+    // Ascending: always-on light, then the active sets.
+    void activeGroups(size_t receiver, std::vector<uint32_t>& groups) const {
+        groups.assign(1, always_group);
         for (const GroupLight& l : direct_.row(receiver))
-            if (active(l.group, luminance(l.value), 0)) flags[l.group] = 1;
+            if (l.group != always_group && active(l.group, luminance(l.value), 0)) groups.push_back(l.group);
         for (const GroupLight& l : bounced_.row(receiver))
-            if (active(l.group, 0, luminance(l.value))) flags[l.group] = 1;
+            if (l.group != always_group && active(l.group, 0, luminance(l.value))) groups.push_back(l.group);
+        std::ranges::sort(groups);
+        groups.erase(std::unique(groups.begin(), groups.end()), groups.end());
     }
 
     void finalPass() {
         progress_.stage("final gather", texels_.size());
-        const GatherOptions options{settings_.final_rays, settings_.emitter_samples, settings_.seed + 1};
+        std::vector<float> floors;
+        for (const GroupReport& g : out_.groups) floors.push_back(noise_floor * g.mean_indirect_lux);
+        const FinalGatherOptions options{.rays_max = settings_.final_rays,
+                                         .emitter_samples = settings_.emitter_samples,
+                                         .noise_max = settings_.noise_max,
+                                         .seed = settings_.seed + 1,
+                                         .floor_lux = floors};
         out_.light = Sparse<ReceiverLight>::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            GroupAccumulator<Gathered> sum(groups_);
+            FinalGather gather(gatherer_, groups_);
             std::vector<ReceiverLight> row;
-            std::vector<uint8_t> flags(groups_);
+            std::vector<uint32_t> groups;
+            uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                gatherer_.gather(i, options, &radiance_, sum, nullptr);
-                for (const ReceiverLight& l : stored_direct_.row(i)) {
-                    sum[l.group].irradiance_lux += l.light.irradiance_lux;
-                    sum[l.group].moment_lux += l.light.moment_lux;
-                }
-                activeGroups(i, flags);
-                row.clear();
-                for (uint32_t g : sum.touched())
-                    if (flags[g]) row.push_back({g, sum[g]});
-                sum.clear();
+                activeGroups(i, groups);
+                traced += gather.gather(i, groups, radiance_, options, row);
                 emit(std::span<const ReceiverLight>(row));
             }
-            rays_traced_ += (end - begin) * options.rays;
+            rays_traced_ += traced;
             progress_.advance(end - begin);
         });
+        radiance_ = {};
+        if (settings_.denoise) out_.light = denoise(unwrap_, texels_, std::move(out_.light), progress_);
+        addStoredDirect();
         for (size_t i = 0; i < texels_.size(); ++i)
             for (const ReceiverLight& l : out_.light.row(i)) ++out_.groups[l.group].receivers;
+    }
+
+    // Direct light of fully baked lamps joins after the filter: it has no noise, and shadows have edges.
+    void addStoredDirect() {
+        out_.light = Sparse<ReceiverLight>::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
+            std::vector<ReceiverLight> row;
+            for (size_t i = begin; i < end; ++i) {
+                const auto gathered = out_.light.row(i);
+                row.assign(gathered.begin(), gathered.end());
+                for (const ReceiverLight& d : stored_direct_.row(i))
+                    for (ReceiverLight& l : row)
+                        if (l.group == d.group) l.light += d.light;
+                emit(std::span<const ReceiverLight>(row));
+            }
+        });
     }
 
     const RayScene& rays_;

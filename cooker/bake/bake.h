@@ -12,8 +12,10 @@ namespace dimmer::cook {
 
 struct BakeSettings {
     uint32_t series_rays = 32;     // per texel, for the bounces; kept as 4-byte links while the series runs
-    uint32_t final_rays = 128;     // per texel, for what is stored
-    uint32_t emitter_samples = 8;  // per texel and light group
+    uint32_t final_rays = 128;     // per texel and light group at most, for what is stored
+    uint32_t emitter_samples = 8;  // per series_rays or round of final rays, towards each light group's emitters
+    float noise_max = 0;   // a light group's rays at a texel end when the 95 % interval is within this share; 0: never
+    bool denoise = false;  // filter what noise is left, in lightmap space
     uint32_t bounces_max = 64;
     float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
     float threshold = 0.01f;  // activity, as a share of a set's mean indirect irradiance where it lights directly
@@ -24,11 +26,13 @@ struct BakeSettings {
 struct ReceiverLight {
     uint32_t group = 0;
     Gathered light;
+    float variance = 0;  // of the luminance of the irradiance, lux^2; Monte Carlo noise alone
 };
 
 struct GroupReport {
     uint64_t receivers = 0;  // active ones
     uint64_t lit_directly = 0;
+    float mean_indirect_lux = 0;  // luminance, over the receivers that the group lights directly
     float threshold_lux = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
     double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1

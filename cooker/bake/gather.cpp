@@ -29,11 +29,12 @@ void Gatherer::gather(size_t receiver, const GatherOptions& options, const Spars
     const glm::vec3 sky = rays_.scene().sky_radiance_cd_m2;
     const float lux_per_radiance = pi / static_cast<float>(options.rays);
     for (uint32_t i = 0; i < options.rays; ++i) {
-        const SamplePoint& origin = texels_.sample(receiver, i % points);
+        const uint32_t index = options.first_ray + i;
+        const SamplePoint& origin = texels_.sample(receiver, index % points);
         const TangentFrame& frame = unwrap_.frames[origin.face];
-        const glm::vec3 d = cosineDirection(sequence2d(i, seed));
+        const glm::vec3 d = cosineDirection(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + i);
+        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + index);
         if (hits) hits[i] = no_index;
         if (!hit) {
             if (sky != glm::vec3(0)) sum[always_group].add(sky * lux_per_radiance, d);
@@ -64,8 +65,9 @@ void Gatherer::sampleEmitters(size_t receiver, const GatherOptions& options, Gro
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, static_cast<uint32_t>(receiver)), range.group);
-            const float choice = (static_cast<float>(i) + unitFloat(hash(seed, i))) / samples;
-            const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(i, seed));
+            const uint32_t index = options.first_ray + i;
+            const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
+            const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(frame, s.direction);
             if (!(s.pdf > 0) || !(d.z > 0)) continue;
             const float by_area = samples * s.pdf, by_hit = static_cast<float>(options.rays) * d.z / pi;

@@ -19,12 +19,19 @@ struct Gathered {
     glm::vec3 moment_lux{0};
 
     void add(glm::vec3 lux, glm::vec3 direction_tangent);
+    Gathered& operator+=(const Gathered& o) {
+        irradiance_lux += o.irradiance_lux;
+        moment_lux += o.moment_lux;
+        return *this;
+    }
+    Gathered operator*(float s) const { return {irradiance_lux * s, moment_lux * s}; }
 };
 
 struct GatherOptions {
     uint32_t rays = 64;            // cosine-distributed, shared out among the texel's sample points
     uint32_t emitter_samples = 4;  // towards each light group's emitters
     uint32_t seed = 0;
+    uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
 };
 
 // Thread-safe: gather() only reads.

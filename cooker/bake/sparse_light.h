@@ -19,6 +19,19 @@ struct GroupLight {
     glm::vec3 value{0};  // irradiance in lux, or radiance in cd/m2, by context
 };
 
+// The unit of parallel work: small enough to share out, large enough to keep scratch memory warm.
+inline constexpr size_t rows_per_block = 256;
+inline size_t blockCount(size_t rows) {
+    return (rows + rows_per_block - 1) / rows_per_block;
+}
+
+// visit(begin, end) for every block, in parallel.
+template <class Visit>
+void forEachBlock(size_t rows, Visit&& visit) {
+    tbb::parallel_for(size_t{0}, blockCount(rows),
+                      [&](size_t b) { visit(b * rows_per_block, std::min(rows, (b + 1) * rows_per_block)); });
+}
+
 // Compressed rows: row i holds the groups that reach receiver i, ascending.
 template <class Entry>
 class Sparse {
@@ -28,31 +41,45 @@ class Sparse {
     size_t entryCount() const { return entries_.size(); }
     size_t bytes() const { return first_.size() * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
 
-    // `fill(begin, end, emit)` calls emit(entries) once for every row of its range, in order. Ranges run in parallel;
-    // the result does not depend on how.
+    // Collects rows block by block; blocks may be filled in parallel, the result does not depend on how.
+    class Builder {
+       public:
+        explicit Builder(size_t rows) : rows_(rows), first_(rows + 1), parts_(blockCount(rows)) {}
+
+        // Rows of one block must come in order.
+        void put(size_t row, std::span<const Entry> entries) {
+            auto& part = parts_[row / rows_per_block];
+            part.insert(part.end(), entries.begin(), entries.end());
+            first_[row + 1] = entries.size();
+        }
+
+        Sparse finish() {
+            Sparse out;
+            out.first_ = std::move(first_);
+            for (size_t i = 0; i < rows_; ++i) out.first_[i + 1] += out.first_[i];
+            out.entries_.reserve(out.first_[rows_]);
+            for (auto& part : parts_) {
+                out.entries_.insert(out.entries_.end(), part.begin(), part.end());
+                part = {};
+            }
+            return out;
+        }
+
+       private:
+        size_t rows_;
+        std::vector<uint64_t> first_;
+        std::vector<std::vector<Entry>> parts_;
+    };
+
+    // `fill(begin, end, emit)` calls emit(entries) once for every row of its range, in order. Ranges run in parallel.
     template <class Fill>
     static Sparse build(size_t rows, Fill&& fill) {
-        constexpr size_t block = 256;
-        const size_t blocks = (rows + block - 1) / block;
-        std::vector<std::vector<Entry>> parts(blocks);
-        Sparse out;
-        out.first_.assign(rows + 1, 0);
-        tbb::parallel_for(size_t{0}, blocks, [&](size_t b) {
-            const size_t begin = b * block, end = std::min(rows, begin + block);
+        Builder builder(rows);
+        forEachBlock(rows, [&](size_t begin, size_t end) {
             size_t row = begin;
-            fill(begin, end, [&](std::span<const Entry> entries) {
-                parts[b].insert(parts[b].end(), entries.begin(), entries.end());
-                out.first_[++row] = entries.size();
-            });
-            parts[b].shrink_to_fit();
+            fill(begin, end, [&](std::span<const Entry> entries) { builder.put(row++, entries); });
         });
-        for (size_t i = 0; i < rows; ++i) out.first_[i + 1] += out.first_[i];
-        out.entries_.reserve(out.first_[rows]);
-        for (auto& part : parts) {
-            out.entries_.insert(out.entries_.end(), part.begin(), part.end());
-            part = {};
-        }
-        return out;
+        return builder.finish();
     }
 
    private:

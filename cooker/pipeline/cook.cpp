@@ -43,6 +43,8 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
     return {.series_rays = quality.series_rays,
             .final_rays = quality.rays,
             .emitter_samples = quality.emitter_samples,
+            .noise_max = quality.noise,
+            .denoise = quality.denoise != 0,
             .bounces_max = quality.bounces,
             .tail_max = quality.tolerance,
             .threshold = profile.threshold};

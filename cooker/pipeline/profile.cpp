@@ -42,6 +42,8 @@ std::vector<Setting> settingsOf(Profile& p) {
         list.push_back({prefix + "series_rays", &q->series_rays, 1, 4096});
         list.push_back({prefix + "rays", &q->rays, 1, 1 << 20});
         list.push_back({prefix + "emitter_samples", &q->emitter_samples, 0, 4096});
+        list.push_back({prefix + "noise", &q->noise, 0, 1});
+        list.push_back({prefix + "denoise", &q->denoise, 0, 1});
         list.push_back({prefix + "bounces", &q->bounces, 1, 1024});
         list.push_back({prefix + "tolerance", &q->tolerance, 1e-6, 1});
     }

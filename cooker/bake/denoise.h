@@ -1,0 +1,14 @@
+// Filters Monte Carlo noise in lightmap space.
+#pragma once
+
+#include <bake/bake.h>
+
+namespace dimmer::cook {
+
+// An edge-avoiding a-trous wavelet filter (Dammertz et al. 2010), guided by each texel's own variance: texels are
+// averaged with others of the same chart whose light of the same group differs by no more than their noise explains.
+// Charts are flat, so normals agree within one. Light groups are filtered apart. Deterministic.
+Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
+                              Progress& progress);
+
+}  // namespace dimmer::cook

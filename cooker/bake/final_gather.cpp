@@ -1,0 +1,62 @@
+#include <bake/final_gather.h>
+
+#include <bake/sampling.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dimmer::cook {
+namespace {
+
+// Fewer rounds say too little about their spread to stop on it.
+constexpr uint32_t rounds_min = 4;
+constexpr float normal_95 = 1.96f;
+
+}  // namespace
+
+void FinalGather::State::add(const Gathered& round) {
+    sum += round;
+    ++rounds;
+    const float value = luminance(round.irradiance_lux), step = value - mean;
+    mean += step / static_cast<float>(rounds);
+    squares += step * (value - mean);
+}
+
+float FinalGather::State::varianceOfMean() const {
+    return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
+}
+
+uint64_t FinalGather::gather(size_t receiver, std::span<const uint32_t> groups, const SparseLight& outgoing,
+                             const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
+    for (uint32_t g : groups) state_[g] = {};
+    const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
+    size_t waiting = groups.size();
+    uint64_t traced = 0;
+    for (uint32_t r = 0; r < rounds_max && waiting > 0; ++r) {
+        gatherer_.gather(receiver,
+                         {.rays = rays_per_round,
+                          .emitter_samples = options.emitter_samples,
+                          .seed = options.seed,
+                          .first_ray = r * rays_per_round},
+                         &outgoing, round_, nullptr);
+        traced += rays_per_round;
+        for (uint32_t g : groups) {
+            State& s = state_[g];
+            if (s.done) continue;
+            s.add(round_[g]);
+            const float interval = normal_95 * std::sqrt(s.varianceOfMean());
+            s.done = r + 1 >= rounds_min && options.noise_max > 0 &&
+                     interval <= options.noise_max * (s.mean + options.floor_lux[g]);
+            waiting -= s.done;
+        }
+        round_.clear();
+    }
+    out.clear();
+    for (uint32_t g : groups) {
+        const State& s = state_[g];
+        out.push_back({g, s.sum * (1 / static_cast<float>(s.rounds)), s.varianceOfMean()});
+    }
+    return traced;
+}
+
+}  // namespace dimmer::cook
