@@ -4,21 +4,61 @@
 #include <bake/sampling.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <numeric>
 
 namespace dimmer::cook {
 namespace {
 
 constexpr float start_offset_m = 2e-4f;
 constexpr float far_m = 1e30f;
-constexpr int roulette_after = 3, vertices_max = 256;
+// Roulette ends paths; the limit is for nothing but a bound (0.99^4096, the largest reflectance's share, is 1e-18).
+constexpr int roulette_after = 3, vertices_max = 4096;
+// Shadow rays to lamps per vertex; with no more lamps than that, each gets its own.
+constexpr uint32_t lamp_rays = 4;
+constexpr uint32_t none = UINT32_MAX;
+
+// The chance that a ray to this point of a surface stops there.
+float coverage(const RayScene& rays, uint32_t triangle, float u, float v) {
+    const Material& material = rays.scene().materials[rays.triangles()[triangle].material];
+    if (material.alpha_mode == AlphaMode::Opaque) return 1;
+    const float alpha = rays.surfaceColor(triangle, u, v).a;
+    if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0f, 1.0f);
+    return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
+}
+
+uint32_t hashOf(glm::vec3 v, uint32_t seed) {
+    for (int i = 0; i < 3; ++i) seed = hash(seed, std::bit_cast<uint32_t>(v[i]));
+    return seed;
+}
 
 }  // namespace
+
+ReferenceOptions onlySet(uint32_t set, size_t set_count, uint32_t seed) {
+    ReferenceOptions options{.seed = seed, .set_weights = std::vector<glm::vec3>(set_count), .always_weight = 0};
+    options.set_weights[set] = glm::vec3(1);
+    return options;
+}
+
+void ReferenceEstimate::add(glm::vec3 irradiance_lux) {
+    const glm::dvec4 value(irradiance_lux, luminance(irradiance_lux));
+    const glm::dvec4 step = value - mean_;
+    mean_ += step / static_cast<double>(++paths_);
+    squares_ += step * (value - mean_);
+}
+
+ReferenceValue ReferenceEstimate::value() const {
+    const double n = paths_;
+    const glm::dvec4 error = n > 1 ? glm::sqrt(squares_ / (n * (n - 1))) : glm::dvec4(0);
+    return {glm::vec3(mean_), glm::vec3(error), static_cast<float>(error.w)};
+}
 
 // A counter-based random stream of one path (hashes of path and dimension): no low-discrepancy set, so that samples are
 // independent and the standard error can be trusted.
 struct ReferenceTracer::Path {
     uint32_t seed;
+    std::vector<float>& weights;  // scratch
     uint32_t dimension = 0;
     float next() { return unitFloat(hash(seed, dimension++)); }
     glm::vec2 next2() {
@@ -28,125 +68,201 @@ struct ReferenceTracer::Path {
     uint32_t nextBits() { return hash(seed, dimension++); }
 };
 
-ReferenceTracer::ReferenceTracer(const RayScene& rays) : rays_(rays) {
-    area_light_of_.assign(rays.triangles().size(), UINT32_MAX);
-    float sum = 0;
+struct ReferenceTracer::Vertex {
+    glm::vec3 point{0}, normal{0};
+    glm::vec3 surface_normal{0};  // as in ReferencePoint
+    float area_weight_sum = 0;    // of the emitters, as seen from here
+    bool below(glm::vec3 direction) const {
+        return surface_normal != glm::vec3(0) && glm::dot(direction, surface_normal) <= 0;
+    }
+};
+
+void ReferenceTracer::Sources::add(glm::vec3 position, float source_power, float least_distance_squared) {
+    x.push_back(position.x);
+    y.push_back(position.y);
+    z.push_back(position.z);
+    power.push_back(source_power);
+    least_distance2.push_back(least_distance_squared);
+}
+
+// Power over squared distance of every source; returns the sum.
+float ReferenceTracer::weigh(const Sources& s, glm::vec3 p, std::vector<float>& weights) {
+    weights.resize(s.size());
+    for (size_t i = 0; i < s.size(); ++i) {
+        const float dx = s.x[i] - p.x, dy = s.y[i] - p.y, dz = s.z[i] - p.z;
+        weights[i] = s.power[i] / std::max(dx * dx + dy * dy + dz * dz, s.least_distance2[i]);
+    }
+    return std::accumulate(weights.begin(), weights.end(), 0.0f);
+}
+
+ReferenceTracer::ReferenceTracer(const RayScene& rays, const ReferenceOptions& options)
+    : rays_(rays), options_(options) {
+    const Scene& scene = rays.scene();
+    for (uint32_t i = 0; i < scene.lights.size(); ++i) {
+        const PunctualLight& light = scene.lights[i];
+        const Light entry{i, weightOf(light.light_set)};
+        const float power = luminance(light.intensity * entry.weight);
+        if (light.bake == BakeMode::None || !(power > 0)) continue;
+        if (light.type == LightType::Directional) {
+            suns_.push_back(entry);
+            continue;
+        }
+        lamps_.push_back(entry);
+        lamp_sources_.add(light.position_m, power, 1e-4f);
+    }
+    area_light_of_.assign(rays.triangles().size(), none);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
-        const Material& material = rays.scene().materials[rays.triangles()[t].material];
-        if (material.emission_cd_m2 == glm::vec3(0)) continue;
+        const LevelTriangle& triangle = rays.triangles()[t];
+        const glm::vec3 radiance =
+            scene.materials[triangle.material].emission_cd_m2 * weightOf(scene.meshes[triangle.mesh].light_set);
+        if (!(luminance(radiance) > 0)) continue;
         const glm::vec3 a = rays.corner(t, 0);
         const float area = 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
-        const float power = area * luminance(material.emission_cd_m2);
         area_light_of_[t] = static_cast<uint32_t>(area_lights_.size());
-        sum += power;
-        area_lights_.push_back({t, area, sum, power});
-    }
-    for (AreaLight& l : area_lights_) {
-        l.cumulative /= sum;
-        l.chance /= sum;
+        area_lights_.push_back({t, area, radiance});
+        area_sources_.add(rays.pointOn(t, 1.0f / 3, 1.0f / 3), area * luminance(radiance), area);
     }
 }
 
-glm::vec3 ReferenceTracer::weightOf(std::optional<uint32_t> set, const ReferenceOptions& options) const {
-    if (!set) return glm::vec3(options.always_weight);
-    return *set < options.set_weights.size() ? options.set_weights[*set] : glm::vec3(1);
+glm::vec3 ReferenceTracer::weightOf(std::optional<uint32_t> set) const {
+    if (!set) return glm::vec3(options_.always_weight);
+    return *set < options_.set_weights.size() ? options_.set_weights[*set] : glm::vec3(1);
 }
 
-glm::vec3 ReferenceTracer::punctual(glm::vec3 point, glm::vec3 normal, bool stored_only,
-                                    const ReferenceOptions& options) const {
+glm::vec3 ReferenceTracer::fromLight(const Light& light, const Vertex& vertex) const {
+    const Illumination lit = illuminate(rays_.scene().lights[light.index], vertex.point);
+    const float cos_surface = glm::dot(vertex.normal, lit.towards_light);
+    if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0) || vertex.below(lit.towards_light))
+        return glm::vec3(0);
+    const float distance = std::isinf(lit.distance_m) ? far_m : lit.distance_m;
+    return light.weight * lit.irradiance_lux *
+           (cos_surface * rays_.transmittance(vertex.point, lit.towards_light, distance));
+}
+
+// Straight from the lights that are baked in full: without noise.
+glm::vec3 ReferenceTracer::directPart(const Vertex& vertex) const {
     glm::vec3 sum(0);
-    for (const PunctualLight& light : rays_.scene().lights) {
-        if (light.bake == BakeMode::None || (stored_only && light.bake != BakeMode::Full)) continue;
-        const glm::vec3 weight = weightOf(light.light_set, options);
-        if (weight == glm::vec3(0)) continue;
-        const Illumination lit = illuminate(light, point);
-        const float cos_surface = glm::dot(normal, lit.towards_light);
-        if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0)) continue;
-        const float distance = std::isinf(lit.distance_m) ? far_m : lit.distance_m;
-        sum += weight * lit.irradiance_lux * (cos_surface * rays_.transmittance(point, lit.towards_light, distance));
+    for (const auto* lights : {&suns_, &lamps_})
+        for (const Light& light : *lights)
+            if (rays_.scene().lights[light.index].bake == BakeMode::Full) sum += fromLight(light, vertex);
+    return sum;
+}
+
+glm::vec3 ReferenceTracer::punctual(const Vertex& vertex, Path& path) const {
+    glm::vec3 sum(0);
+    for (const Light& sun : suns_) sum += fromLight(sun, vertex);
+    if (lamps_.size() <= lamp_rays) {
+        for (const Light& lamp : lamps_) sum += fromLight(lamp, vertex);
+        return sum;
+    }
+    const float all = weigh(lamp_sources_, vertex.point, path.weights);
+    if (!(all > 0)) return sum;
+    // Systematic sampling: `lamp_rays` equal steps through the cumulated weights, one random shift.
+    const float step = all / lamp_rays;
+    float target = path.next() * step, cumulative = 0;
+    for (size_t i = 0; i < lamps_.size(); ++i) {
+        cumulative += path.weights[i];
+        float picked = 0;
+        for (; target < cumulative; target += step) ++picked;
+        if (picked > 0) sum += fromLight(lamps_[i], vertex) * (picked * step / path.weights[i]);
     }
     return sum;
 }
 
-float ReferenceTracer::areaPdf(uint32_t triangle, float distance_m, float cos_emitter) const {
-    const AreaLight& l = area_lights_[area_light_of_[triangle]];
-    return l.chance * distance_m * distance_m / (l.area_m2 * std::max(cos_emitter, 1e-7f));
+// The density per steradian with which areaLight() finds a point of an emitter.
+float ReferenceTracer::areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const {
+    const Sources& s = area_sources_;
+    const glm::vec3 to = glm::vec3(s.x[area_light], s.y[area_light], s.z[area_light]) - vertex.point;
+    const float weight = s.power[area_light] / std::max(glm::dot(to, to), s.least_distance2[area_light]);
+    return weight / vertex.area_weight_sum * distance_m * distance_m /
+           (area_lights_[area_light].area_m2 * std::max(cos_emitter, 1e-7f));
 }
 
-glm::vec3 ReferenceTracer::areaLight(glm::vec3 point, glm::vec3 normal, Path& path,
-                                     const ReferenceOptions& options) const {
-    if (area_lights_.empty()) return glm::vec3(0);
-    const float choice = path.next();
+glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
+    if (!(vertex.area_weight_sum > 0)) return glm::vec3(0);
+    float choice = path.next() * vertex.area_weight_sum;
     const glm::vec2 u = path.next2();
-    auto it = std::ranges::upper_bound(area_lights_, choice, {}, &AreaLight::cumulative);
-    if (it == area_lights_.end()) --it;
+    uint32_t chosen = 0;
+    for (; chosen + 1 < path.weights.size() && choice >= path.weights[chosen]; ++chosen) choice -= path.weights[chosen];
+    const AreaLight& light = area_lights_[chosen];
     const float root = std::sqrt(u.x);
-    const glm::vec3 to_target = rays_.pointOn(it->triangle, root * (1 - u.y), root * u.y) - point;
+    const float a = root * (1 - u.y), b = root * u.y;
+    const glm::vec3 to_target = rays_.pointOn(light.triangle, a, b) - vertex.point;
     const float distance = glm::length(to_target);
     if (!(distance > 0)) return glm::vec3(0);
     const glm::vec3 direction = to_target / distance;
-    const LevelTriangle& triangle = rays_.triangles()[it->triangle];
+    const LevelTriangle& triangle = rays_.triangles()[light.triangle];
     const Material& material = rays_.scene().materials[triangle.material];
     const float facing = -glm::dot(direction, triangle.normal);
     const float cos_emitter = material.double_sided ? std::abs(facing) : facing;
-    const float cos_surface = glm::dot(direction, normal);
-    if (!(cos_emitter > 0) || !(cos_surface > 0)) return glm::vec3(0);
-    const float by_area = areaPdf(it->triangle, distance, cos_emitter), by_hit = cos_surface / pi;
-    const glm::vec3 weight = weightOf(rays_.scene().meshes[triangle.mesh].light_set, options);
-    return weight * material.emission_cd_m2 *
-           (cos_surface * rays_.transmittance(point, direction, distance * (1 - 1e-4f)) / (by_area + by_hit));
+    const float cos_surface = glm::dot(direction, vertex.normal);
+    if (!(cos_emitter > 0) || !(cos_surface > 0) || vertex.below(direction)) return glm::vec3(0);
+    const float by_area = areaPdf(vertex, chosen, distance, cos_emitter), by_hit = cos_surface / pi;
+    // What is cut out or blended shines by its alpha, as a ray that hits it finds.
+    const float shown = coverage(rays_, light.triangle, a, b);
+    return light.radiance_cd_m2 *
+           (shown * cos_surface * rays_.transmittance(vertex.point, direction, distance * (1 - 1e-4f)) /
+            (by_area + by_hit));
 }
 
-// One path's estimate of the stored irradiance at its first point.
-glm::vec3 ReferenceTracer::trace(glm::vec3 point, glm::vec3 normal, Path& path, const ReferenceOptions& options) const {
+// One path's estimate of the stored irradiance at its first point, without the noiseless direct part.
+glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
     const Scene& scene = rays_.scene();
-    glm::vec3 sum = areaLight(point, normal, path, options);
-    glm::vec3 throughput(pi);  // radiance at the next hit to irradiance here, for cosine-distributed rays
-    for (int vertex = 0; vertex < vertices_max; ++vertex) {
+    glm::vec3 sum(0);
+    // From radiance at the next hit to irradiance here, for cosine-distributed rays.
+    glm::vec3 throughput(pi);
+    for (int i = 0; i < vertices_max; ++i) {
+        if (i > 0) sum += throughput / pi * punctual(vertex, path);
+        vertex.area_weight_sum = weigh(area_sources_, vertex.point, path.weights);
+        sum += throughput / pi * areaLight(vertex, path);
+        if (i > roulette_after) {
+            const float survive = std::clamp(std::max({throughput.x, throughput.y, throughput.z}) / pi, 0.05f, 0.95f);
+            if (path.next() >= survive) return sum;
+            throughput /= survive;
+        }
         glm::vec3 t, b;
-        orthonormalBasis(normal, t, b);
+        orthonormalBasis(vertex.normal, t, b);
         const glm::vec3 d = cosineDirection(path.next2());
-        const glm::vec3 direction = t * d.x + b * d.y + normal * d.z;
-        const auto hit = rays_.nearest(point, direction, far_m, path.nextBits());
-        if (!hit) return sum + throughput * scene.sky_radiance_cd_m2 * options.always_weight;
+        const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
+        if (vertex.below(direction)) return sum;
+        const auto hit = rays_.nearest(vertex.point, direction, far_m, path.nextBits());
+        if (!hit) return sum + throughput * scene.sky_radiance_cd_m2 * options_.always_weight;
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
-        const SceneMesh& mesh = scene.meshes[triangle.mesh];
         const Material& material = scene.materials[triangle.material];
         if (hit->back && !material.double_sided) return sum;
-        if (material.emission_cd_m2 != glm::vec3(0)) {
+        if (const uint32_t light = area_light_of_[hit->triangle]; light != none) {
             const float by_hit = d.z / pi;
-            const float by_area =
-                areaPdf(hit->triangle, hit->distance_m, std::abs(glm::dot(direction, triangle.normal)));
-            sum += throughput * weightOf(mesh.light_set, options) * material.emission_cd_m2 *
-                   (by_hit / (by_hit + by_area));
+            const float cos_emitter = std::abs(glm::dot(direction, triangle.normal));
+            const float by_area = areaPdf(vertex, light, hit->distance_m, cos_emitter);
+            sum += throughput * area_lights_[light].radiance_cd_m2 * (by_hit / (by_hit + by_area));
         }
-        if (mesh.lighting == Lighting::None) return sum;
-        normal = hit->back ? -triangle.normal : triangle.normal;
-        point = rays_.pointOn(hit->triangle, hit->u, hit->v) + normal * start_offset_m;
-        const glm::vec3 rho = material.reflectance(glm::vec3(rays_.surfaceColor(hit->triangle, hit->u, hit->v)));
-        throughput *= rho;
-        sum += throughput / pi * (punctual(point, normal, false, options) + areaLight(point, normal, path, options));
-        if (vertex < roulette_after) continue;
-        const float survive = std::min(0.95f, std::max({rho.x, rho.y, rho.z}));
-        if (path.next() >= survive) return sum;
-        throughput /= survive;
+        if (scene.meshes[triangle.mesh].lighting == Lighting::None) return sum;
+        const glm::vec3 normal = hit->back ? -triangle.normal : triangle.normal;
+        vertex = {.point = rays_.pointOn(hit->triangle, hit->u, hit->v) + normal * start_offset_m, .normal = normal};
+        throughput *= material.reflectance(glm::vec3(rays_.surfaceColor(hit->triangle, hit->u, hit->v)));
     }
     return sum;
 }
 
-ReferenceValue ReferenceTracer::irradiance(glm::vec3 point_m, glm::vec3 normal, const ReferenceOptions& options) const {
-    glm::dvec3 mean(0), squares(0);  // Welford
-    const glm::vec3 start = point_m + normal * start_offset_m;
-    for (uint32_t i = 0; i < options.paths; ++i) {
-        Path path{hash(options.seed, i)};
-        const glm::dvec3 value(trace(start, normal, path, options));
-        const glm::dvec3 step = value - mean;
-        mean += step / static_cast<double>(i + 1);
-        squares += step * (value - mean);
+ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t paths) const {
+    ReferenceEstimate estimate;
+    refine(estimate, point, paths);
+    return estimate.value();
+}
+
+void ReferenceTracer::refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const {
+    const glm::vec3 up = point.surface_normal == glm::vec3(0) ? point.normal : point.surface_normal;
+    const Vertex start{.point = point.position_m + up * start_offset_m,
+                       .normal = point.normal,
+                       .surface_normal = point.surface_normal};
+    const glm::vec3 direct = directPart(start);
+    // By place: the errors of two points are independent. Not by state: differences between states have less noise.
+    const uint32_t seed = hashOf(point.normal, hashOf(point.position_m, options_.seed));
+    std::vector<float> weights;
+    for (uint32_t i = 0; i < paths; ++i) {
+        Path path{hash(seed, estimate.paths()), weights};
+        estimate.add(direct + trace(start, path));
     }
-    const double n = options.paths;
-    const glm::dvec3 error = n > 1 ? glm::sqrt(squares / (n * (n - 1))) : glm::dvec3(0);
-    return {glm::vec3(mean) + punctual(start, normal, true, options), glm::vec3(error)};
 }
 
 }  // namespace dimmer::cook

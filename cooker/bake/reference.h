@@ -6,46 +6,93 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 namespace dimmer::cook {
 
+// Which light is asked for.
 struct ReferenceOptions {
-    uint32_t paths = 4096;
     uint32_t seed = 1;
     // Weight of each light set, per channel; 1 where the list is shorter.
     std::vector<glm::vec3> set_weights;
     float always_weight = 1;  // 0 leaves out all always-on light
 };
 
+// The same for one light set alone, without always-on light.
+ReferenceOptions onlySet(uint32_t set, size_t set_count, uint32_t seed = 1);
+
 struct ReferenceValue {
     glm::vec3 irradiance_lux{0};
     glm::vec3 standard_error_lux{0};
+    // Of the luminance; the channels share their paths, so it does not follow from theirs.
+    float luminance_error_lux = 0;
+};
+
+// Where irradiance is asked for.
+struct ReferencePoint {
+    glm::vec3 position_m, normal;
+    // The normal of the surface that the point lies on, where `normal` is tilted against it: light from below the
+    // surface is left out, and so is what the surface itself would send to a tilted normal. Zero: nothing left out.
+    glm::vec3 surface_normal{0};
+};
+
+// Running mean and variance over paths (Welford 1962) of red, green, blue and luminance.
+class ReferenceEstimate {
+   public:
+    void add(glm::vec3 irradiance_lux);
+    uint32_t paths() const { return paths_; }
+    ReferenceValue value() const;
+
+   private:
+    glm::dvec4 mean_{0}, squares_{0};
+    uint32_t paths_ = 0;
 };
 
 // Thread-safe. The component that a pack stores: indirect light, and direct light of emitters, the sky and lights baked
-// with BakeMode::Full. Doors stand as `rays` has them. Emitters and lights by next-event estimation at every vertex
-// (emitters combined with hits by the balance heuristic), Russian roulette after three bounces.
+// with BakeMode::Full. Doors stand as `rays` has them. Paths with next-event estimation at every vertex: emitters
+// combined with hits by the balance heuristic, punctual lights picked by what they would do unshadowed; Russian
+// roulette after three bounces. Unbiased.
 class ReferenceTracer {
    public:
-    explicit ReferenceTracer(const RayScene& rays);
-    ReferenceValue irradiance(glm::vec3 point_m, glm::vec3 normal, const ReferenceOptions& options) const;
+    ReferenceTracer(const RayScene& rays, const ReferenceOptions& options);
+
+    ReferenceValue irradiance(const ReferencePoint& point, uint32_t paths) const;
+    // Goes on where `estimate` of the same point stands: the outcome depends on the sum of paths alone.
+    void refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const;
 
    private:
     struct Path;
+    struct Vertex;
+    // Sources of one kind as arrays, so that weighing all of them is one vectorised loop.
+    struct Sources {
+        std::vector<float> x, y, z, power, least_distance2;
+        size_t size() const { return x.size(); }
+        void add(glm::vec3 position, float source_power, float least_distance_squared);
+    };
     struct AreaLight {
         uint32_t triangle;
         float area_m2;
-        float cumulative;  // chance up to and including this one
-        float chance;
+        glm::vec3 radiance_cd_m2;  // weighted
     };
-    glm::vec3 weightOf(std::optional<uint32_t> set, const ReferenceOptions& options) const;
-    glm::vec3 punctual(glm::vec3 point, glm::vec3 normal, bool stored_only, const ReferenceOptions& options) const;
-    glm::vec3 areaLight(glm::vec3 point, glm::vec3 normal, Path& path, const ReferenceOptions& options) const;
-    glm::vec3 trace(glm::vec3 point, glm::vec3 normal, Path& path, const ReferenceOptions& options) const;
-    float areaPdf(uint32_t triangle, float distance_m, float cos_emitter) const;
+    struct Light {
+        uint32_t index;  // into Scene::lights
+        glm::vec3 weight;
+    };
+    static float weigh(const Sources& sources, glm::vec3 point, std::vector<float>& weights);
+
+    glm::vec3 weightOf(std::optional<uint32_t> set) const;
+    glm::vec3 fromLight(const Light& light, const Vertex& vertex) const;
+    glm::vec3 directPart(const Vertex& vertex) const;
+    glm::vec3 punctual(const Vertex& vertex, Path& path) const;
+    glm::vec3 areaLight(const Vertex& vertex, Path& path) const;
+    float areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const;
+    glm::vec3 trace(Vertex vertex, Path& path) const;
 
     const RayScene& rays_;
+    ReferenceOptions options_;
+    std::vector<Light> suns_, lamps_;  // directional, and those with a place; only what shines
+    Sources lamp_sources_, area_sources_;
     std::vector<AreaLight> area_lights_;
     std::vector<uint32_t> area_light_of_;  // per level triangle
 };

@@ -1,13 +1,13 @@
 #include <charts/texels.h>
 
 #include <bake/sampling.h>
+#include <charts/padding.h>
 #include <charts/raster.h>
 #include <pack/pack_data.h>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 
 namespace dimmer::cook {
 namespace {
@@ -18,8 +18,8 @@ constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
-// Bilinear filtering needs one ring around what is lit; the second covers texels of which only a corner is visible.
-constexpr int fill_rings = 2;
+// A texel whose first points all lie inside geometry is given up.
+constexpr uint32_t drops_max = 24;
 
 struct Covered {
     uint64_t texel;  // index over all pages
@@ -60,29 +60,30 @@ class TexelSampler {
         const uint64_t texel = faces[0].texel;
         const auto x = static_cast<uint32_t>(texel % unwrap_.page_width);
         const auto y = static_cast<uint32_t>(texel / unwrap_.page_width % unwrap_.page_height);
-        std::vector<SurfacePoint> found;
-        for (uint32_t i = 1; i <= halton_tries && found.size() < samples_max_; ++i) {
+        Usable usable;
+        for (uint32_t i = 1; i <= halton_tries && result.points.size() < samples_max_; ++i) {
+            if (result.points.empty() && usable.dropped >= drops_max) break;
             const glm::vec2 p(static_cast<float>(x) + radicalInverse(2, i),
                               static_cast<float>(y) + radicalInverse(3, i));
             for (const Covered& c : faces)
                 if (auto b = barycentric(unwrap_.uv_texels[c.face], p)) {
-                    found.push_back({c.face, *b});
+                    tryPoint({c.face, *b}, usable, result);
                     break;
                 }
         }
-        float covered = 0, largest = 0;
+        float largest = 0;
         SurfacePoint centroid{};
         for (const Covered& c : faces) {
             const auto polygon = clipToCell(unwrap_.uv_texels[c.face], x, y);
             const float area = polygonArea(polygon);
-            covered += area;
             result.area_m2 += area * unwrap_.texel_area_m2[c.face];
             if (area <= largest) continue;
             largest = area;
             centroid = {c.face, weightsAt(c.face, mean(polygon))};
         }
-        if (found.empty() && largest > 0) found.push_back(centroid);
-        keepUsable(found, result);
+        if (usable.tried == 0 && largest > 0) tryPoint(centroid, usable, result);
+        if (usable.tried > 0) result.reflectance /= static_cast<float>(usable.tried);
+        if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(result.points);
         return result;
     }
 
@@ -105,22 +106,22 @@ class TexelSampler {
         return glm::clamp(w, glm::vec2(0), glm::vec2(1));
     }
 
-    void keepUsable(const std::vector<SurfacePoint>& found, Result& result) const {
-        const Scene& scene = rays_.scene();
-        bool dropped = false;
-        for (const SurfacePoint& s : found) {
-            const uint32_t triangle = unwrap_.faces[s.face].triangle;
-            const glm::vec3 normal = unwrap_.frames[s.face].normal;
-            const glm::vec3 position = rays_.pointOn(triangle, s.weights.x, s.weights.y) + normal * lift_m;
-            const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
-            result.reflectance += scene.materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color)) /
-                                  static_cast<float>(found.size());
-            if (insideGeometry(position, s.face))
-                dropped = true;
-            else
-                result.points.push_back({position, s.face});
-        }
-        if (dropped && result.points.size() > 1) keepOneSideOfWalls(result.points);
+    struct Usable {
+        uint32_t tried = 0, dropped = 0;
+    };
+
+    void tryPoint(const SurfacePoint& s, Usable& usable, Result& result) const {
+        const uint32_t triangle = unwrap_.faces[s.face].triangle;
+        const glm::vec3 position =
+            rays_.pointOn(triangle, s.weights.x, s.weights.y) + unwrap_.frames[s.face].normal * lift_m;
+        const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
+        result.reflectance +=
+            rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
+        ++usable.tried;
+        if (insideGeometry(position, s.face))
+            ++usable.dropped;
+        else
+            result.points.push_back({position, s.face});
     }
 
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
@@ -159,45 +160,6 @@ class TexelSampler {
     uint32_t samples_max_;
 };
 
-// Every other texel of a chart's rectangle takes the nearest receiver of the chart, found ring by ring. What is stored
-// for display ends after a few rings: deeper inside solids nobody looks, and it stays black there.
-void standIn(const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& out) {
-    auto index = [&](uint32_t page, uint32_t x, uint32_t y) {
-        return (size_t{page} * unwrap.page_height + y) * unwrap.page_width + x;
-    };
-    constexpr std::array<std::array<int, 2>, 8> neighbours = {
-        {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
-    std::vector<std::array<uint32_t, 2>> front, next;
-    for (const Chart& c : unwrap.charts) {
-        front.clear();
-        for (uint32_t y = c.y; y < c.y + c.height; ++y)
-            for (uint32_t x = c.x; x < c.x + c.width; ++x)
-                if (out.receiver_at[index(c.page, x, y)] != no_index) front.push_back({x, y});
-        // Bilinear filtering reaches one texel past what is covered, and covered texels may lie deeper.
-        auto needed = [&](uint32_t x, uint32_t y) {
-            for (uint32_t ny = std::max(y, c.y + 1) - 1; ny <= std::min(y + 1, c.y + c.height - 1); ++ny)
-                for (uint32_t nx = std::max(x, c.x + 1) - 1; nx <= std::min(x + 1, c.x + c.width - 1); ++nx)
-                    if (covered[index(c.page, nx, ny)]) return true;
-            return false;
-        };
-        for (int ring = 1; !front.empty(); ++ring) {
-            next.clear();
-            for (auto [x, y] : front)
-                for (auto [dx, dy] : neighbours) {
-                    const auto nx = static_cast<uint32_t>(static_cast<int>(x) + dx);
-                    const auto ny = static_cast<uint32_t>(static_cast<int>(y) + dy);
-                    if (nx - c.x >= c.width || ny - c.y >= c.height) continue;
-                    uint32_t& receiver = out.receiver_at[index(c.page, nx, ny)];
-                    if (receiver != no_index) continue;
-                    receiver = out.receiver_at[index(c.page, x, y)];
-                    next.push_back({nx, ny});
-                    if (ring <= fill_rings && needed(nx, ny)) out.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
-                }
-            front.swap(next);
-        }
-    }
-}
-
 }  // namespace
 
 Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max) {
@@ -233,7 +195,7 @@ Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples
         out.samples.insert(out.samples.end(), results[i].points.begin(), results[i].points.end());
         out.first_sample.push_back(static_cast<uint32_t>(out.samples.size()));
     }
-    standIn(unwrap, covered, out);
+    fillPadding(rays, unwrap, covered, out);
     return out;
 }
 

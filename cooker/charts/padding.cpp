@@ -1,0 +1,121 @@
+#include <charts/padding.h>
+
+#include <charts/planar.h>
+#include <charts/raster.h>
+#include <pack/pack_data.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+
+namespace dimmer::cook {
+namespace {
+
+// Bilinear filtering needs one ring around what is lit. Deeper inside solids nobody looks: it stays black there.
+constexpr int fill_rings = 1;
+// A neighbour's surface is looked for within this distance of the plane.
+constexpr float same_plane_m = 2e-3f;
+constexpr float same_direction = 0.999f;
+
+class Padding {
+   public:
+    Padding(const RayScene& rays, const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& texels)
+        : rays_(rays), unwrap_(unwrap), covered_(covered), texels_(texels) {}
+
+    void fill() {
+        std::vector<uint32_t> chart_of_fill;
+        for (uint32_t c = 0; c < unwrap_.charts.size(); ++c) {
+            growRings(unwrap_.charts[c]);
+            chart_of_fill.resize(texels_.fills.size(), c);
+        }
+        std::vector<uint32_t> sources(texels_.fills.size());
+        tbb::parallel_for(size_t{0}, texels_.fills.size(), [&](size_t i) {
+            const uint32_t beyond = acrossSeam(texels_.fills[i], chart_of_fill[i]);
+            sources[i] = beyond != no_index ? beyond : texels_.fills[i].source;
+        });
+        for (size_t i = 0; i < sources.size(); ++i) texels_.fills[i].source = sources[i];
+    }
+
+   private:
+    size_t index(uint32_t page, uint32_t x, uint32_t y) const {
+        return (size_t{page} * unwrap_.page_height + y) * unwrap_.page_width + x;
+    }
+
+    bool touchesCovered(const Chart& c, uint32_t x, uint32_t y) const {
+        for (uint32_t ny = std::max(y, c.y + 1) - 1; ny <= std::min(y + 1, c.y + c.height - 1); ++ny)
+            for (uint32_t nx = std::max(x, c.x + 1) - 1; nx <= std::min(x + 1, c.x + c.width - 1); ++nx)
+                if (covered_[index(c.page, nx, ny)]) return true;
+        return false;
+    }
+
+    void growRings(const Chart& c) {
+        constexpr std::array<std::array<int, 2>, 8> neighbours = {
+            {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+        std::vector<std::array<uint32_t, 2>> front, next;
+        for (uint32_t y = c.y; y < c.y + c.height; ++y)
+            for (uint32_t x = c.x; x < c.x + c.width; ++x)
+                if (texels_.receiver_at[index(c.page, x, y)] != no_index) front.push_back({x, y});
+        for (int ring = 1; !front.empty(); ++ring) {
+            next.clear();
+            for (auto [x, y] : front)
+                for (auto [dx, dy] : neighbours) {
+                    const auto nx = static_cast<uint32_t>(static_cast<int>(x) + dx);
+                    const auto ny = static_cast<uint32_t>(static_cast<int>(y) + dy);
+                    if (nx - c.x >= c.width || ny - c.y >= c.height) continue;
+                    uint32_t& receiver = texels_.receiver_at[index(c.page, nx, ny)];
+                    if (receiver != no_index) continue;
+                    receiver = texels_.receiver_at[index(c.page, x, y)];
+                    next.push_back({nx, ny});
+                    if (ring <= fill_rings && touchesCovered(c, nx, ny))
+                        texels_.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
+                }
+            front.swap(next);
+        }
+    }
+
+    // The receiver of another chart of the same plane that lies under the fill's centre; no_index when there is none.
+    uint32_t acrossSeam(const FillTexel& fill, uint32_t chart) const {
+        const SamplePoint& own = texels_.sample(fill.source, 0);
+        const Face face = unwrap_.faces[own.face];
+        const TangentFrame& frame = unwrap_.frames[own.face];
+        const glm::vec3 centre =
+            positionAt(own.face, glm::vec2(TexelAddress::x(fill.address) + 0.5f, TexelAddress::y(fill.address) + 0.5f));
+        const auto hit = rays_.nearest(centre + frame.normal * same_plane_m, -frame.normal, 2 * same_plane_m, 0);
+        if (!hit || hit->back != face.back) return no_index;
+        const uint32_t other_face = unwrap_.faceOf(hit->triangle, hit->back);
+        if (other_face == no_index || unwrap_.face_chart[other_face] == chart) return no_index;
+        const TangentFrame& other = unwrap_.frames[other_face];
+        if (glm::dot(other.normal, frame.normal) < same_direction ||
+            glm::dot(other.tangent, frame.tangent) < same_direction ||
+            glm::dot(other.bitangent, frame.bitangent) < same_direction)
+            return no_index;
+        const uint32_t found = receiverOf(unwrap_, texels_, *hit);
+        if (found == no_index || found == fill.source) return no_index;
+        const glm::vec3 lift = frame.normal * wall_probe_low_m;
+        const glm::vec3 from = own.position_m + lift, to = texels_.sample(found, 0).position_m + lift;
+        return rays_.blocked(from, to) || rays_.blocked(to, from) ? no_index : found;
+    }
+
+    // The plane of a face, continued to any place of the page.
+    glm::vec3 positionAt(uint32_t face, glm::vec2 uv_texels) const {
+        const auto& t = unwrap_.uv_texels[face];
+        const float area = cross2d(t[1] - t[0], t[2] - t[0]);
+        const float u = cross2d(uv_texels - t[0], t[2] - t[0]) / area,
+                    v = cross2d(t[1] - t[0], uv_texels - t[0]) / area;
+        return rays_.pointOn(unwrap_.faces[face].triangle, u, v);
+    }
+
+    const RayScene& rays_;
+    const Unwrap& unwrap_;
+    const std::vector<uint8_t>& covered_;
+    Texels& texels_;
+};
+
+}  // namespace
+
+void fillPadding(const RayScene& rays, const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& texels) {
+    Padding(rays, unwrap, covered, texels).fill();
+}
+
+}  // namespace dimmer::cook
