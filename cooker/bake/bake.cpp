@@ -256,7 +256,10 @@ class Baker {
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
                 activeGroups(i, groups);
-                traced += gather.gather(i, groups, radiance_, options, row);
+                row.clear();
+                if (!settings_.per_set_passes) traced += gather.gather(i, groups, radiance_, options, row);
+                for (size_t g = 0; settings_.per_set_passes && g < groups.size(); ++g)
+                    traced += gather.gather(i, {&groups[g], 1}, radiance_, options, row);
                 emit(std::span<const ReceiverLight>(row));
             }
             rays_traced_ += traced;

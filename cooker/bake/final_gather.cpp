@@ -51,7 +51,6 @@ uint64_t FinalGather::gather(size_t receiver, std::span<const uint32_t> groups, 
         }
         round_.clear();
     }
-    out.clear();
     for (uint32_t g : groups) {
         const State& s = state_[g];
         out.push_back({g, s.sum * (1 / static_cast<float>(s.rounds)), s.varianceOfMean()});

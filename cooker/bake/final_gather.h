@@ -23,7 +23,7 @@ class FinalGather {
    public:
     FinalGather(const Gatherer& gatherer, uint32_t groups) : gatherer_(gatherer), round_(groups), state_(groups) {}
 
-    // Fills `out` with the light of `groups` (ascending) at `receiver`. Rays are shared, decisions are not: a group's
+    // Appends to `out` the light of `groups` (ascending) at `receiver`. Rays are shared, decisions are not: a group's
     // value and sample count do not depend on which other groups are asked for. Returns the rays traced.
     uint64_t gather(size_t receiver, std::span<const uint32_t> groups, const SparseLight& outgoing,
                     const FinalGatherOptions& options, std::vector<ReceiverLight>& out);

@@ -47,7 +47,8 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
             .denoise = quality.denoise != 0,
             .bounces_max = quality.bounces,
             .tail_max = quality.tolerance,
-            .threshold = profile.threshold};
+            .threshold = profile.threshold,
+            .per_set_passes = quality.per_set_passes};
 }
 
 // Elements and contributions: one contribution per light set, until doors have their own.
@@ -136,8 +137,10 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
 Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     std::optional<tbb::global_control> limit;
     if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
-    const auto profile = loadProfile(options.profile);
+    auto profile = loadProfile(options.profile);
     if (!profile) return std::unexpected(profile.error());
+    for (Quality* quality : {&profile->draft, &profile->preview, &profile->final})
+        quality->per_set_passes = options.per_set_passes;
     CookResult result;
     Expected<Scene> scene;
     {

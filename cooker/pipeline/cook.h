@@ -18,7 +18,8 @@ struct CookOptions {
     std::filesystem::path level, pack;
     std::string profile = "desktop";
     std::string quality = "preview";
-    uint32_t threads = 0;  // 0: as many as the machine has
+    uint32_t threads = 0;         // 0: as many as the machine has
+    bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
 };
 
 struct CookStats {
