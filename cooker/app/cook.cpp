@@ -2,6 +2,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
+#include <write/pack_writer.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -43,9 +44,9 @@ void printTable(const CookResult& result, const PackCost& cost, const Profile& p
                    (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
                    humanBytes(e.bytes), e.receivers, 100 * static_cast<double>(dropped));
     }
-    fmt::print("\n{} pages of {} x {}, {} clusters, {} batches, {} bounces, {:.1f} M rays, peak {}\n", pack.page_count,
-               pack.page_width, pack.page_height, pack.clusters.size(), pack.batches.size(), result.stats.bounces,
-               static_cast<double>(result.stats.rays) / 1e6, humanBytes(result.stats.peak_bytes));
+    fmt::print("\npages: {} of {} x {} texels, {} clusters, {} batches, {} bounces, {:.1f} M rays, peak {}\n",
+               pack.page_count, pack.page_width, pack.page_height, pack.clusters.size(), pack.batches.size(),
+               result.stats.bounces, static_cast<double>(result.stats.rays) / 1e6, humanBytes(result.stats.peak_bytes));
 }
 
 nlohmann::ordered_json toJson(const CookResult& result) {
@@ -65,6 +66,9 @@ nlohmann::ordered_json toJson(const CookResult& result) {
 int run(const Arguments& a) {
     const auto profile = loadProfile(a.options.profile);
     if (!profile) return reportError(profile.error());
+    if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
+    if (!a.json.empty() && a.json != "-")
+        if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
     TerminalProgress progress;
     const auto result = cook(a.options, progress);
     if (!result) return reportError(result.error());
@@ -83,7 +87,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option("LEVEL", a->options.level, "the level, .glb or .gltf (see docs/level.md)")->required();
     c->add_option("-o,--output", a->options.pack, "the pack to write, e.g. house.dimmer")->required();
     c->add_option("--profile", a->options.profile,
-                  fmt::format("target: {}, or a JSON file", fmt::join(shippedProfiles(), ", ")))
+                  fmt::format("the target's budgets and densities: {}, or a JSON file that extends one",
+                              fmt::join(shippedProfiles(), ", ")))
         ->capture_default_str();
     c->add_option("--quality", a->options.quality,
                   "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
@@ -91,8 +96,16 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
-    c->add_option("--json", a->json, "write stage times, rays, peak memory and warnings there; - for stdout");
-    c->footer("Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
+    c->add_flag("--per-set-passes", a->options.per_set_passes,
+                "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
+    c->add_option(
+        "--json", a->json,
+        "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");
+    c->footer(
+        "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
+        "profile's\n"
+        "budget: exit code 3, nothing is written. Distances in levels are in metres, densities in texels per metre.\n"
+        "Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }
 

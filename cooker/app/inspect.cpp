@@ -17,6 +17,10 @@ struct Arguments {
     bool settings = false;
 };
 
+bool isDoor(const PackData& d, uint32_t element) {
+    return d.elements[element].kind == ElementKind::Door;
+}
+
 std::string lightName(const PackData& d, const Contribution& c) {
     return c.light_set ? d.elements[*c.light_set].name : "always";
 }
@@ -25,6 +29,20 @@ std::vector<std::string> names(const PackData& d, const std::vector<uint32_t>& e
     std::vector<std::string> out;
     for (uint32_t e : elements) out.push_back(d.elements[e].name);
     return out;
+}
+
+// {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, so
+// that nothing nested without end is followed.
+nlohmann::ordered_json settingsOf(const PackData& d) {
+    const auto all = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
+    auto settings = nlohmann::ordered_json::object();
+    if (!all.is_object()) return settings;
+    for (const auto& [key, setting] : all.items()) {
+        if (!setting.is_object() || !setting.contains("value") || !setting.contains("from")) continue;
+        const auto &value = setting["value"], &from = setting["from"];
+        if (value.is_primitive() && from.is_string()) settings[key] = {{"value", value}, {"from", from}};
+    }
+    return settings;
 }
 
 nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
@@ -51,15 +69,14 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     j["elements"] = nlohmann::ordered_json::array();
     for (const ElementCost& e : cost.elements)
         j["elements"].push_back({{"name", d.elements[e.element].name},
-                                 {"kind", d.elements[e.element].kind == ElementKind::Door ? "door" : "set"},
+                                 {"kind", isDoor(d, e.element) ? "door" : "set"},
                                  {"receivers", e.receivers},
                                  {"bytes", e.bytes}});
     j["clusters"] = d.clusters.size();
     j["batches"] = d.batches.size();
     j["mixed_batches"] = 0;
     j["overlap_histogram"] = cost.overlap_histogram;
-    const auto settings = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
-    j["settings"] = settings.is_discarded() ? nlohmann::ordered_json::object() : settings;
+    j["settings"] = settingsOf(d);
     return j;
 }
 
@@ -72,9 +89,13 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
     row("  ancillary", cost.ancillary);
     row("meshes (host)", cost.meshes);
     fmt::print(
-        "\n{} pages of {} x {}; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n", d.page_count,
-        d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
+        "\npages: {} of {} x {} texels; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n",
+        d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
+    fmt::print("\n{:<26} {:>12} {:>12}\n", "element", "receivers", "bytes");
+    for (const ElementCost& e : cost.elements)
+        fmt::print("{:<26} {:>12} {:>12}\n", (isDoor(d, e.element) ? "door:" : "") + d.elements[e.element].name,
+                   e.receivers, humanBytes(e.bytes));
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,
@@ -86,10 +107,10 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
 }
 
 void printSettings(const PackData& d) {
-    const auto settings = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
-    for (const auto& [key, value] : settings.items())
-        fmt::print("{:<32} {:<16} {}\n", key, value.value("value", nlohmann::ordered_json()).dump(),
-                   value.value("from", ""));
+    fmt::print("{:<32} {:<16} {}\n", "setting", "value", "from");
+    const auto settings = settingsOf(d);
+    for (const auto& [key, setting] : settings.items())
+        fmt::print("{:<32} {:<16} {}\n", key, setting["value"].dump(), setting["from"].get<std::string>());
 }
 
 int run(const Arguments& a) {
@@ -100,9 +121,10 @@ int run(const Arguments& a) {
     const PackCost cost = costOf(pack->data());
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(pack->data(), cost, file_bytes), a.json); !ok) return reportError(ok.error());
+    if (a.json == "-") return exit_done;
     if (a.settings)
         printSettings(pack->data());
-    else if (a.json != "-")
+    else
         printTable(pack->data(), cost, file_bytes);
     return exit_done;
 }
@@ -117,7 +139,11 @@ void addInspectCommand(CLI::App& app, int& exit_code) {
         ->expected(0, 1)
         ->default_str("-");
     c->add_flag("--settings", a->settings, "print every setting of the cook and where it came from");
-    c->footer("Example: dimmer inspect house.dimmer --json -");
+    c->footer(
+        "Sizes are in bytes (kB and MB: 1000 and 1000000 of them); energy dropped is the share of a light's energy "
+        "that\n"
+        "fell below the threshold and is not stored; overlap is the number of contributions stored at a texel.\n"
+        "Example: dimmer inspect house.dimmer --json house.json");
     c->callback([a, c, &exit_code] {
         if (c->count("--json") > 0 && a->json.empty()) a->json = "-";
         exit_code = run(*a);

@@ -56,13 +56,15 @@ int run(const Arguments& a) {
 
 void addSampleCommand(CLI::App& app, int& exit_code) {
     auto a = std::make_shared<Arguments>();
-    auto* c = app.add_subcommand("sample", "Irradiance at points, from the runtime's own pages");
+    auto* c = app.add_subcommand("sample", "Irradiance in lux at points, from the pages that the runtime blends");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--points", a->points, "CSV with the header x,y,z,nx,ny,nz (metres, glTF axes); - for stdin")
         ->required();
-    c->add_option("--state", a->state,
-                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1, doors 0; all=0 "
-                  "turns every set off first");
+    c->add_option(
+        "--state", a->state,
+        "weights: a light set's name = scalar or r/g/b (1: as baked), door:NAME = 0 closed .. 1 open; e.g. "
+        "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1, doors 0. all=0 turns every set "
+        "off first");
     c->add_option("--from", a->from, "surface: the lightmap at the nearest surface within 10 cm")
         ->check(CLI::IsMember({"surface"}))
         ->capture_default_str();
@@ -71,7 +73,9 @@ void addSampleCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_option("-o,--output", a->output, "CSV to write, with Er,Eg,Eb in lux added; - for stdout")
         ->capture_default_str();
-    c->footer("Example: dimmer sample house.dimmer --points in.csv --state \"all=0,hall=1\" > out.csv");
+    c->footer(
+        "Points without a lightmapped surface within 10 cm that faces along their normal get nan.\n"
+        "Example: dimmer sample house.dimmer --points in.csv --state \"all=0,hall=1\" > out.csv");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }
 

@@ -1,12 +1,14 @@
 #include <pipeline/profile.h>
 
 #include <shipped_profiles.h>
+#include <update/state_text.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -18,6 +20,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int extends_depth_max = 8;
+constexpr const char* base_profile = "desktop";
 
 struct Setting {
     std::string key;
@@ -54,12 +57,15 @@ std::unexpected<Error> bad(const std::string& source, const std::string& text) {
     return fail(ErrorCode::BadInput, fmt::format("profile {}: {}", source, text));
 }
 
+// A profile nests three deep ("bake", "draft", "rays"); what goes deeper is nobody's setting and need not be followed.
+constexpr int nesting_max = 3;
+
 // Flattens nested objects to dotted keys.
-void flatten(const json& object, const std::string& prefix, std::map<std::string, json>& out) {
+void flatten(const json& object, const std::string& prefix, int depth, std::map<std::string, json>& out) {
     for (const auto& [key, value] : object.items()) {
         const std::string path = prefix.empty() ? key : prefix + "." + key;
-        if (value.is_object())
-            flatten(value, path, out);
+        if (value.is_object() && depth < nesting_max)
+            flatten(value, path, depth + 1, out);
         else
             out[path] = value;
     }
@@ -79,43 +85,88 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
     return {};
 }
 
-Expected<void> apply(Profile& profile, const std::string& name_or_file, int depth);
+// "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
+std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
+    const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
+    if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
+    std::vector<std::string_view> known = {"extends", "description"};
+    for (const Setting& s : settings) known.push_back(s.key);
+    if (const std::string_view nearest = nearestName(key, known); !nearest.empty())
+        return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
+    return fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", "));
+}
 
-Expected<void> applyText(Profile& profile, const std::string& text, const std::string& source, int depth) {
-    const json root = json::parse(text, nullptr, false);
-    if (root.is_discarded() || !root.is_object()) return bad(source, "this is not a JSON object");
-    if (root.contains("extends")) {
-        if (!root["extends"].is_string()) return bad(source, "'extends' must be a profile's name");
-        if (depth >= extends_depth_max) return bad(source, "profiles extend one another in a circle");
-        if (auto ok = apply(profile, root["extends"].get<std::string>(), depth + 1); !ok) return ok;
+// A JSON document with where it stands.
+struct Source {
+    std::string name;    // for messages: a shipped profile's name, or the file as given
+    std::string origin;  // for the pack: without folders, so that the same cook gives the same bytes everywhere
+    std::filesystem::path folder;  // what `extends` may be relative to
+    std::string text;
+};
+
+Expected<json> parseObject(const Source& source) {
+    try {
+        json root = json::parse(source.text);
+        if (root.is_object()) return root;
+        return bad(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
+    } catch (const json::exception& error) {
+        // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
+        const std::string_view text = error.what();
+        return bad(source.name, fmt::format("this is not JSON: {}", text.substr(text.find("] ") + 2)));
     }
+}
+
+Expected<Source> findSource(const std::string& name_or_file, const std::filesystem::path& folder) {
+    for (const auto& [name, text] : shipped_profiles)
+        if (name == name_or_file) return Source{std::string(name), std::string(name), {}, std::string(text)};
+    const std::filesystem::path path = folder / name_or_file;
+    std::ifstream file(path, std::ios::binary);
+    if (!file || std::filesystem::is_directory(path)) {
+        const auto shipped = shippedProfiles();
+        const std::string_view nearest = nearestName(name_or_file, {shipped.begin(), shipped.end()});
+        return fail(
+            ErrorCode::NotFound,
+            fmt::format("there is no profile '{}': give a file or one of {}{}", path.string(), fmt::join(shipped, ", "),
+                        nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+    }
+    std::stringstream text;
+    text << file.rdbuf();
+    return Source{path.string(), path.filename().string(), path.parent_path(), text.str()};
+}
+
+Expected<void> apply(Profile& profile, const Source& source, int depth);
+
+// The profile that this one starts from: what it names, else the default one.
+Expected<void> applyBase(Profile& profile, const json& root, const Source& source, int depth) {
+    if (!root.contains("extends") && source.name == base_profile) return {};
+    const json extends = root.value("extends", json(base_profile));
+    if (!extends.is_string()) return bad(source.name, "'extends' must be a shipped profile's name or a file");
+    if (depth >= extends_depth_max) return bad(source.name, "profiles extend one another in a circle");
+    const auto base = findSource(extends.get<std::string>(), source.folder);
+    if (!base) return bad(source.name, "'extends': " + base.error().message);
+    return apply(profile, *base, depth + 1);
+}
+
+Expected<void> apply(Profile& profile, const Source& source, int depth) {
+    const auto root = parseObject(source);
+    if (!root) return std::unexpected(root.error());
+    if (auto ok = applyBase(profile, *root, source, depth); !ok) return ok;
     const auto settings = settingsOf(profile);
     std::map<std::string, json> values;
-    flatten(root, "", values);
+    flatten(*root, "", 1, values);
     for (const auto& [key, value] : values) {
         if (key == "extends" || key == "description") continue;
         const auto it = std::ranges::find(settings, key, &Setting::key);
-        if (it == settings.end()) {
-            std::vector<std::string> known;
-            for (const Setting& s : settings) known.push_back(s.key);
-            return bad(source, fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", ")));
-        }
-        if (auto ok = assign(*it, value, source); !ok) return ok;
-        profile.origin[key] = source;
+        if (it == settings.end()) return bad(source.name, unknownKey(key, value, settings));
+        if (auto ok = assign(*it, value, source.name); !ok) return ok;
+        profile.origin[key] = source.origin;
     }
     return {};
 }
 
-Expected<void> apply(Profile& profile, const std::string& name_or_file, int depth) {
-    for (const auto& [name, text] : shipped_profiles)
-        if (name == name_or_file) return applyText(profile, std::string(text), std::string(name), depth);
-    std::ifstream file(name_or_file, std::ios::binary);
-    if (!file || std::filesystem::is_directory(name_or_file))
-        return fail(ErrorCode::NotFound, fmt::format("there is no profile '{}': give a file or one of {}", name_or_file,
-                                                     fmt::join(shippedProfiles(), ", ")));
-    std::stringstream text;
-    text << file.rdbuf();
-    return applyText(profile, text.str(), name_or_file, depth);
+// The shortest decimal that reads back as the same float: 0.01, not 0.009999999776482582.
+double shortDecimal(float value) {
+    return std::stod(fmt::format("{}", value));
 }
 
 }  // namespace
@@ -136,7 +187,12 @@ std::string Profile::settingsJson(const std::string& quality) const {
         const auto from = origin.find(s.key);
         std::visit(
             [&](auto* v) {
-                out[s.key] = {{"value", *v}, {"from", from == origin.end() ? "default" : from->second}};
+                auto& setting = out[s.key];
+                if constexpr (std::is_same_v<decltype(v), float*>)
+                    setting["value"] = shortDecimal(*v);
+                else
+                    setting["value"] = *v;
+                setting["from"] = from == origin.end() ? "default" : from->second;
             },
             s.target);
     }
@@ -144,8 +200,10 @@ std::string Profile::settingsJson(const std::string& quality) const {
 }
 
 Expected<Profile> loadProfile(const std::string& name_or_file) {
+    const auto source = findSource(name_or_file, {});
+    if (!source) return std::unexpected(source.error());
     Profile profile;
-    if (auto ok = apply(profile, name_or_file, 0); !ok) return std::unexpected(ok.error());
+    if (auto ok = apply(profile, *source, 0); !ok) return std::unexpected(ok.error());
     return profile;
 }
 

@@ -19,6 +19,7 @@ struct Quality {
     uint32_t denoise = 0;            // 1: filter the noise that is left
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
+    bool per_set_passes = false;     // see BakeSettings; from the command line alone
 };
 
 struct Profile {
@@ -29,7 +30,7 @@ struct Profile {
     float threshold = 0.01f;  // activity, see BakeSettings
     Quality draft, preview, final;
 
-    // Where each setting's value comes from: "default", a profile's name, or its file.
+    // Where each setting's value comes from: a shipped profile's name or a file's; what is not listed: "default".
     std::map<std::string, std::string> origin;
 
     const Quality* quality(const std::string& name) const;
@@ -37,7 +38,9 @@ struct Profile {
     std::string settingsJson(const std::string& quality) const;
 };
 
-// A shipped profile by name, or a file. Unknown keys, wrong types and values out of range are errors that name the key.
+// A shipped profile by name, or a file. A profile changes what it names of the one that it `extends` (a shipped one, or
+// a file beside it; "desktop" where it does not say). Unknown keys, wrong types and values out of range are errors that
+// name the key.
 Expected<Profile> loadProfile(const std::string& name_or_file);
 std::vector<std::string> shippedProfiles();
 

@@ -40,6 +40,7 @@ Expected<std::vector<QueryPoint>> parsePoints(std::istream& in, const std::strin
     for (size_t number = 1; std::getline(in, line); ++number) {
         if (!line.empty() && line.back() == '\r') line.pop_back();
         if (number == 1) {
+            if (line.starts_with("\xef\xbb\xbf")) line.erase(0, 3);  // a byte order mark, as spreadsheets write it
             if (!line.starts_with("x,y,z,nx,ny,nz")) return bad(file, 1, "the header must begin x,y,z,nx,ny,nz");
             continue;
         }
@@ -51,7 +52,9 @@ Expected<std::vector<QueryPoint>> parsePoints(std::istream& in, const std::strin
         if (!(length > 1e-6f)) return bad(file, number, "the normal has no length");
         points.push_back({{v[0], v[1], v[2]}, normal / length});
     }
-    if (points.empty()) return bad(file, 1, "there are no points");
+    if (in.bad()) return fail(ErrorCode::Io, fmt::format("{}: the points cannot be read", file));
+    if (points.empty())
+        return bad(file, 1, "there are no points: a header x,y,z,nx,ny,nz and a line per point were expected");
     return points;
 }
 

@@ -157,8 +157,47 @@ class Writer {
     std::vector<std::vector<std::byte>> bodies_;
 };
 
-std::unexpected<Error> ioError(const std::filesystem::path& path, std::string_view what) {
-    return fail(ErrorCode::Io, fmt::format("{}: {}: {}; nothing was changed", path.string(), what, strerror(errno)));
+std::unexpected<Error> ioError(const std::filesystem::path& path, std::string_view what, int error) {
+    return fail(ErrorCode::Io, fmt::format("{}: {}: {}", path.string(), what, strerror(error)));
+}
+
+bool writeAll(int file, std::span<const std::byte> bytes) {
+    for (size_t done = 0; done < bytes.size();) {
+        const ssize_t n = ::write(file, bytes.data() + done, bytes.size() - done);
+        if (n < 0 && errno != EINTR) return false;
+        if (n > 0) done += static_cast<size_t>(n);
+    }
+    return true;
+}
+
+// A device, pipe or terminal has no content to keep, and must not be replaced by a file.
+Expected<void> writeToSpecialFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    const int file = open(path.c_str(), O_WRONLY | O_CLOEXEC);
+    if (file < 0) return ioError(path, "cannot be opened", errno);
+    const int error = writeAll(file, bytes) ? 0 : errno;
+    close(file);
+    if (error != 0) return ioError(path, "cannot be written", error);
+    return {};
+}
+
+// mkstemp's files are private; a file that anybody makes is not.
+bool giveUsualRights(int file) {
+    const mode_t mask = umask(0);
+    umask(mask);
+    return fchmod(file, 0666 & ~mask) == 0;
+}
+
+Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    std::string temporary = path.string() + ".XXXXXX";
+    const int file = mkstemp(temporary.data());
+    if (file < 0) return ioError(path, "no file can be made in this folder", errno);
+    const bool written = writeAll(file, bytes) && giveUsualRights(file) && fsync(file) == 0;
+    const int error = written ? 0 : errno;
+    close(file);
+    if (written && rename(temporary.c_str(), path.c_str()) == 0) return {};
+    const auto failed = ioError(path, "cannot be written, nothing was changed", written ? errno : error);
+    unlink(temporary.c_str());
+    return failed;
 }
 
 }  // namespace
@@ -167,31 +206,28 @@ std::vector<std::byte> packBytes(const PackData& data) {
     return Writer(data).write();
 }
 
-Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-    std::string temporary = path.string() + ".XXXXXX";
-    const int file = mkstemp(temporary.data());
-    if (file < 0) return ioError(path, "cannot write in this folder");
-    auto abandon = [&](std::string_view what) {
-        auto error = ioError(path, what);
-        close(file);
-        unlink(temporary.c_str());
-        return error;
-    };
-    for (size_t done = 0; done < bytes.size();) {
-        const ssize_t n = ::write(file, bytes.data() + done, bytes.size() - done);
-        if (n < 0 && errno != EINTR) return abandon("cannot write the pack");
-        if (n > 0) done += static_cast<size_t>(n);
-    }
-    const mode_t mask = umask(0);
-    umask(mask);
-    if (fchmod(file, 0666 & ~mask) != 0 || fsync(file) != 0) return abandon("cannot flush the pack");
-    close(file);
-    if (rename(temporary.c_str(), path.c_str()) != 0) {
-        auto error = ioError(path, "cannot put the finished pack in its place");
-        unlink(temporary.c_str());
-        return error;
-    }
+Expected<void> checkWritable(const std::filesystem::path& path) {
+    std::error_code ignored;
+    if (path.empty()) return fail(ErrorCode::InvalidArgument, "the name of the file to write is empty");
+    if (std::filesystem::is_directory(path, ignored)) return ioError(path, "cannot be written", EISDIR);
+    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    if (!std::filesystem::is_directory(folder, ignored))
+        return fail(ErrorCode::Io, fmt::format("{}: there is no folder {}", path.string(), folder.string()));
+    if (access(folder.c_str(), W_OK | X_OK) != 0 && !std::filesystem::exists(path, ignored))
+        return ioError(path, "no file can be made in this folder", errno);
     return {};
+}
+
+Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    if (auto ok = checkWritable(path); !ok) return ok;
+    std::error_code error;
+    const auto status = std::filesystem::status(path, error);
+    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+        return writeToSpecialFile(path, bytes);
+    // The file that a link stands for is what the user means to replace.
+    const auto target =
+        std::filesystem::is_symlink(path, error) ? std::filesystem::weakly_canonical(path, error) : path;
+    return replaceFile(error ? path : target, bytes);
 }
 
 }  // namespace dimmer::cook

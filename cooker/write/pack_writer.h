@@ -13,7 +13,11 @@ namespace dimmer::cook {
 // The same data gives the same bytes.
 std::vector<std::byte> packBytes(const PackData& data);
 
-// Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete.
+// Whether a file of that name can be expected to be writable; asked before hours of work, not after.
+Expected<void> checkWritable(const std::filesystem::path& path);
+
+// Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete. Links are
+// followed; devices and pipes are written to directly.
 Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 
 }  // namespace dimmer::cook

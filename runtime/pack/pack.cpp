@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
+#include <exception>
 #include <fstream>
+#include <new>
 
 namespace dimmer {
 
@@ -16,11 +18,15 @@ Expected<Pack> Pack::fromData(PackData data) {
 
 Expected<Pack> Pack::fromBytes(std::span<const std::byte> bytes, std::string_view name) {
     auto in_file = [&](const Error& error) { return Error{error.code, fmt::format("{}: {}", name, error.message)}; };
-    auto data = readPack(bytes);
-    if (!data) return std::unexpected(in_file(data.error()));
-    auto pack = fromData(std::move(*data));
-    if (!pack) return std::unexpected(in_file(pack.error()));
-    return pack;
+    try {
+        auto data = readPack(bytes);
+        if (!data) return std::unexpected(in_file(data.error()));
+        auto pack = fromData(std::move(*data));
+        if (!pack) return std::unexpected(in_file(pack.error()));
+        return pack;
+    } catch (const std::bad_alloc&) {
+        return std::unexpected(in_file({ErrorCode::OutOfMemory, "there is no memory for what the pack holds"}));
+    }
 }
 
 Expected<Pack> Pack::open(const std::filesystem::path& path) {
@@ -30,7 +36,13 @@ Expected<Pack> Pack::open(const std::filesystem::path& path) {
     if (error || !file)
         return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(),
                                                error ? error.message() : "no permission to read"));
-    std::vector<std::byte> bytes(size);
+    std::vector<std::byte> bytes;
+    try {
+        bytes.resize(size);
+    } catch (const std::exception&) {  // a sparse file may claim any size
+        return fail(ErrorCode::OutOfMemory,
+                    fmt::format("{}: there is no memory for its {} bytes", path.string(), size));
+    }
     if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
         return fail(ErrorCode::Io, fmt::format("{}: reading stopped before its end", path.string()));
     return fromBytes(bytes, path.string());

@@ -12,7 +12,7 @@ namespace dimmer {
 // A stored lightmap texel, 8 bytes; see runtime/format/texel.h.
 struct TexelRecord {
     uint32_t irradiance = 0;  // B10G11R11_UFLOAT_PACK32
-    uint32_t direction = 0;   // R8G8B8A8_UNORM
+    uint32_t direction = 0;   // A2B10G10R10_UNORM_PACK32
     bool operator==(const TexelRecord&) const = default;
 };
 static_assert(sizeof(TexelRecord) == 8);

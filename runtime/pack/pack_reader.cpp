@@ -4,10 +4,12 @@
 #include <format/hash.h>
 #include <format/layout.h>
 
-#include <fmt/format.h>
-#include <zstd.h>
+#include <pack/decompress.h>
 
-#include <algorithm>
+#include <fmt/format.h>
+
+#include <map>
+#include <utility>
 
 namespace dimmer {
 namespace {
@@ -33,8 +35,13 @@ std::string name(ChunkType type) {
     return text;
 }
 
+// "BASE", "PAYL 3".
+std::string name(ChunkType type, uint32_t subject) {
+    return type == ChunkType::Payload ? fmt::format("{} {}", name(type), subject) : name(type);
+}
+
 std::string name(const Chunk& chunk) {
-    return name(static_cast<ChunkType>(chunk.type));
+    return name(static_cast<ChunkType>(chunk.type), chunk.subject);
 }
 
 class Reader {
@@ -64,6 +71,7 @@ class Reader {
         then([&] { return table(ChunkType::Meshes, [&](ByteReader& in) { readMeshes(in, d); }); });
         then([&] { return table(ChunkType::Viewpoints, [&](ByteReader& in) { readViewpoints(in, d); }); });
         then([&] { return table(ChunkType::Settings, [&](ByteReader& in) { d.settings_json = in.getString(); }); });
+        then([&] { return checkNothingLeft(); });
         if (!ok) return std::unexpected(ok.error());
         return d;
     }
@@ -91,13 +99,18 @@ class Reader {
         if (format::headerHash(header_, raw) != header_.xxh64) return bad("the header or the chunk table is damaged");
         chunks_.resize(header_.chunk_count);
         if (!raw.empty()) std::memcpy(chunks_.data(), raw.data(), raw.size());
+        const uint64_t table_end = sizeof(header_) + raw.size();
         for (const Chunk& c : chunks_) {
+            if (c.offset < table_end || c.offset % format::chunk_alignment_bytes != 0)
+                return bad("chunk {} is misplaced", name(c));
             if (c.offset > file_.size() || c.stored_bytes > file_.size() - c.offset)
                 return bad("chunk {} reaches past the end of the file", name(c));
             if (c.real_bytes / expansion_max > c.stored_bytes || c.shuffle == 0)
                 return bad("chunk {} has an impossible size", name(c));
             if (!known(c.type) && !(c.flags & format::chunk_optional))
                 return bad("chunk {} is of a type that this build does not know", name(c));
+            if (known(c.type) && !by_name_.emplace(std::pair(c.type, c.subject), &c).second)
+                return bad("chunk {} stands there twice", name(c));
         }
         return {};
     }
@@ -120,29 +133,22 @@ class Reader {
         return false;
     }
 
-    Expected<const Chunk*> find(ChunkType type, uint32_t subject) const {
-        const Chunk* found = nullptr;
-        for (const Chunk& c : chunks_) {
-            if (c.type != static_cast<uint32_t>(type) || c.subject != subject) continue;
-            if (found) return bad("chunk {} stands there twice", name(c));
-            found = &c;
-        }
-        if (!found) return bad("chunk {} {} is missing", name(type), subject);
-        return found;
-    }
-
-    Expected<std::vector<std::byte>> load(ChunkType type, uint32_t subject) const {
-        const auto chunk = find(type, subject);
-        if (!chunk) return std::unexpected(chunk.error());
-        const Chunk& c = **chunk;
+    Expected<std::vector<std::byte>> load(ChunkType type, uint32_t subject) {
+        const auto found = by_name_.find({static_cast<uint32_t>(type), subject});
+        if (found == by_name_.end()) return bad("chunk {} is missing", name(type, subject));
+        const Chunk& c = *found->second;
+        by_name_.erase(found);
         const auto stored = file_.subspan(c.offset, c.stored_bytes);
         if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
-        if (ZSTD_getFrameContentSize(stored.data(), stored.size()) != c.real_bytes)
-            return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
-        std::vector<std::byte> shuffled(c.real_bytes);
-        const size_t got = ZSTD_decompress(shuffled.data(), shuffled.size(), stored.data(), stored.size());
-        if (ZSTD_isError(got) || got != c.real_bytes) return bad("chunk {} cannot be decompressed", name(c));
-        return unshuffle(std::move(shuffled), c.shuffle);
+        auto shuffled = decompress(stored, c.real_bytes);
+        if (!shuffled) return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
+        return unshuffle(std::move(*shuffled), c.shuffle);
+    }
+
+    Expected<void> checkNothingLeft() const {
+        if (by_name_.empty()) return {};
+        const Chunk& c = *by_name_.begin()->second;
+        return bad("chunk {} belongs to nothing", name(c));
     }
 
     static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record) {
@@ -155,17 +161,17 @@ class Reader {
     }
 
     template <class T>
-    Expected<void> array(ChunkType type, std::vector<T>& out, uint32_t subject = 0) const {
+    Expected<void> array(ChunkType type, std::vector<T>& out, uint32_t subject = 0) {
         auto bytes = load(type, subject);
         if (!bytes) return std::unexpected(bytes.error());
-        if (bytes->size() % sizeof(T) != 0) return bad("chunk {} ends within a record", name(type));
+        if (bytes->size() % sizeof(T) != 0) return bad("chunk {} ends within a record", name(type, subject));
         const size_t old = out.size();
         out.resize(old + bytes->size() / sizeof(T));
         if (!bytes->empty()) std::memcpy(out.data() + old, bytes->data(), bytes->size());
         return {};
     }
 
-    Expected<void> table(ChunkType type, auto&& parse) const {
+    Expected<void> table(ChunkType type, auto&& parse) {
         auto bytes = load(type, 0);
         if (!bytes) return std::unexpected(bytes.error());
         ByteReader in(*bytes);
@@ -174,12 +180,12 @@ class Reader {
         return {};
     }
 
-    Expected<void> readPayload(PackData& d) const {
+    Expected<void> readPayload(PackData& d) {
         for (uint32_t k = 0; k < d.contributions.size(); ++k) {
             const size_t before = d.payload.size();
             if (auto ok = array(ChunkType::Payload, d.payload, k); !ok) return ok;
             if (d.payload.size() - before != d.contributions[k].receivers)
-                return bad("payload {} holds {} records instead of {}", k, d.payload.size() - before,
+                return bad("chunk PAYL {} holds {} records instead of {}", k, d.payload.size() - before,
                            d.contributions[k].receivers);
         }
         return {};
@@ -249,6 +255,7 @@ class Reader {
     std::span<const std::byte> file_;
     format::Header header_{};
     std::vector<Chunk> chunks_;
+    std::map<std::pair<uint32_t, uint32_t>, const Chunk*> by_name_;  // type and subject; those not yet loaded
 };
 
 }  // namespace
