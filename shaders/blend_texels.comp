@@ -1,14 +1,15 @@
-// Blends batches of lightmap texels: one workgroup per batch, one lane per receiver, each texel written once. The CPU
-// twin is blendTexel in runtime/cpu/cpu_runtime.cpp.
+// Blends work items of lightmap texels (see dimmer/work_list.glsl), each texel written once. A lane takes two neighbouring receivers at a time, so
+// that a record of both is one load of 16 bytes, and eight lanes walk through a batch of up to 64. Batches of different
+// clusters share a workgroup: a cluster of a handful of texels leaves seven lanes idle, not sixty-three.
+// The CPU twin is blendBatch in runtime/cpu/cpu_runtime.cpp.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
 #include "dimmer/texel.glsl"
-#include "dimmer/work_list.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x_id = 1) in;
 
-// Contributions that are on in every batch of this dispatch; -1: each batch has its own number.
+// The most contributions that are on in an item of this dispatch, and up to 8 the number in each; -1: no limit.
 layout(constant_id = 0) const int terms_on = -1;
 
 layout(push_constant) uniform Dispatch {
@@ -17,40 +18,117 @@ layout(push_constant) uniform Dispatch {
 }
 dispatch;
 
-layout(set = 0, binding = 0, std430) readonly buffer Addresses { uint addresses[]; };
-layout(set = 0, binding = 1, std430) readonly buffer Base { uvec2 base[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Payload { uvec2 payload[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Items { WorkItem items[]; };
-layout(set = 0, binding = 4, std430) readonly buffer Terms { WorkTerm terms[]; };
-layout(set = 0, binding = 5, r32ui) writeonly uniform uimage2DArray irradiance_pages;
-layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray direction_pages;
+// Texel buffers, as lavapipe loads 16 bytes from one several times faster than from a storage buffer.
+layout(set = 0, binding = 0) uniform utextureBuffer addresses;  // TexelAddress, two receivers an element
+layout(set = 0, binding = 1) uniform utextureBuffer base;       // two records an element
+layout(set = 0, binding = 2) uniform utextureBuffer payload;    // two records an element
+layout(set = 0, binding = 3) uniform utextureBuffer work;       // WorkItem
+layout(set = 0, binding = 4) uniform utextureBuffer terms;      // WorkTerm
+layout(set = 0, binding = 5) uniform utextureBuffer places;         // BatchPlace
+layout(set = 0, binding = 6) uniform utextureBuffer first_records;  // per cluster and contribution of it
+layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray irradiance_pages;
+layout(set = 0, binding = 8, r32ui) writeonly uniform uimage2DArray direction_pages;
 
-uvec2 blend_texel(uint receiver, WorkItem item) {
-    uvec2 base_record = base[receiver];
-    int count = terms_on < 0 ? int(item.term_count) : terms_on;
-    if (count == 0) return base_record;
-    DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, 0.0, 0.0, 0.0);
-    sum = dimmer_blend_add(sum, base_record, vec3(1));
-    for (int i = 0; i < count; ++i) {
-        WorkTerm term = terms[item.first_term + i];
-        sum = dimmer_blend_add(sum, payload[term.payload_bias + receiver],
-                               vec3(term.weight_r, term.weight_g, term.weight_b));
+const uint lanes_per_item = 8u;
+const uint receivers_per_lane = 2u;
+const int specialised_max = 16;
+const int exact_max = 8;
+const int block = 4;  // terms at a time where there are more
+// Outside every page: a store there has no effect.
+const ivec3 nowhere = ivec3(-1);
+
+// Eight lanes share these.
+struct Item {
+    uvec4 work, place;  // WorkItem, BatchPlace
+};
+
+// The pair of records `offset` receivers into the item.
+uvec4 load_pair(uint first_record, uint offset) {
+    return texelFetch(payload, int((first_record + offset) >> 1));
+}
+
+// The item's first record of a term, and its weight.
+uvec4 locate(Item item, uint index) {
+    uvec4 term = texelFetch(terms, int(item.work.y + index));
+    return uvec4(texelFetch(first_records, int(item.place.w + term.x)).x + item.place.z, term.yzw);
+}
+
+// Past an item's last term its record stands in, weighted with 0: that changes no bit of a sum.
+uvec4 load_term(Item item, uint t) {
+    if (terms_on >= 0 && terms_on <= exact_max) return locate(item, t);
+    uint count = item.work.z;
+    uvec4 term = locate(item, min(t, count - 1u));
+    return t < count ? term : uvec4(term.x, 0, 0, 0);
+}
+
+// Both texels of a pair with `terms_on` terms; all is loaded before it is used, one texel's sums live at a time.
+uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
+    uvec4 base_pair = texelFetch(base, int((item.place.x + offset) >> 1));
+    if (terms_on == 0) return base_pair;
+    uvec4 pair[specialised_max];
+    for (int t = 0; t < terms_on; ++t) pair[t] = load_pair(term[t].x, offset);
+
+    DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
+    dimmer_blend_add(sum, base_pair.x, base_pair.y, vec3(dimmer_weight_scale));
+    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].x, pair[t].y, uintBitsToFloat(term[t].yzw));
+    uvec2 first = dimmer_blend_encode(sum);
+
+    sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
+    dimmer_blend_add(sum, base_pair.z, base_pair.w, vec3(dimmer_weight_scale));
+    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].z, pair[t].w, uintBitsToFloat(term[t].yzw));
+    return uvec4(first, dimmer_blend_encode(sum));
+}
+
+// The same for any number of terms, in blocks within which the sums stay in registers; padded like load_term.
+uvec4 blend_pair_loop(Item item, uint offset) {
+    uvec4 base_pair = texelFetch(base, int((item.place.x + offset) >> 1));
+    DimmerTexelBlend first = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
+    DimmerTexelBlend second = first;
+    dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale));
+    dimmer_blend_add(second, base_pair.z, base_pair.w, vec3(dimmer_weight_scale));
+    for (uint begin = 0u; begin < item.work.z; begin += uint(block)) {
+        uvec4 pair[block];
+        vec3 weight[block];
+        for (int t = 0; t < block; ++t) {
+            uvec4 term = load_term(item, begin + uint(t));
+            pair[t] = load_pair(term.x, offset);
+            weight[t] = uintBitsToFloat(term.yzw);
+        }
+        for (int t = 0; t < block; ++t) dimmer_blend_add(first, pair[t].x, pair[t].y, weight[t]);
+        for (int t = 0; t < block; ++t) dimmer_blend_add(second, pair[t].z, pair[t].w, weight[t]);
     }
-    return dimmer_blend_encode(sum);
+    return uvec4(dimmer_blend_encode(first), dimmer_blend_encode(second));
+}
+
+ivec3 texel_of(uint address) {
+    return ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);
+}
+
+void store(ivec3 texel, uvec2 record) {
+    imageStore(irradiance_pages, texel, uvec4(record.x));
+    imageStore(direction_pages, texel, uvec4(record.y));
+}
+
+void store_pair(Item item, uint offset, uvec4 records) {
+    uvec2 address = texelFetch(addresses, int((item.place.x + offset) >> 1)).xy;
+    store(texel_of(address.x), records.xy);
+    store(offset + 1u < item.place.y ? texel_of(address.y) : nowhere, records.zw);
 }
 
 void main() {
     // The grid is 2D only because one side of it is limited.
-    uint index = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    uint index = group * (gl_WorkGroupSize.x / lanes_per_item) + gl_LocalInvocationIndex / lanes_per_item;
     if (index >= dispatch.item_count) return;
-    WorkItem item = items[dispatch.first_item + index];
-    uint lane = gl_LocalInvocationIndex;
-    if (lane >= item.receiver_count) return;
+    Item item;
+    item.work = texelFetch(work, int(dispatch.first_item + index));
+    item.place = texelFetch(places, int(item.work.x));
 
-    uint receiver = item.first_receiver + lane;
-    uint address = addresses[receiver];
-    ivec3 texel = ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);  // TexelAddress
-    uvec2 record = blend_texel(receiver, item);
-    imageStore(irradiance_pages, texel, uvec4(record.x));
-    imageStore(direction_pages, texel, uvec4(record.y));
+    uvec4 term[specialised_max];
+    for (int t = 0; t < terms_on; ++t) term[t] = load_term(item, uint(t));
+    uint lane = gl_LocalInvocationIndex % lanes_per_item;
+    for (uint offset = lane * receivers_per_lane; offset < item.place.y;
+         offset += lanes_per_item * receivers_per_lane) {
+        store_pair(item, offset, terms_on < 0 ? blend_pair_loop(item, offset) : blend_pair(item, offset, term));
+    }
 }

@@ -17,6 +17,7 @@ enum ExitCode : int {
     exit_our_fault = 1,
     exit_bad_input = 2,
     exit_over_budget = 3,
+    exit_above_max_error = 4,
 };
 
 // Each adds a subcommand whose callback stores the process's exit code.
@@ -24,6 +25,9 @@ void addCookCommand(CLI::App& app, int& exit_code);
 void addInspectCommand(CLI::App& app, int& exit_code);
 void addSampleCommand(CLI::App& app, int& exit_code);
 void addBenchCommand(CLI::App& app, int& exit_code);
+void addSynthCommand(CLI::App& app, int& exit_code);
+void addVerifyCommand(CLI::App& app, int& exit_code);
+void addReferenceCommand(CLI::App& app, int& exit_code);
 
 // Prints the message to stderr; the exit code that belongs to it.
 int reportError(const Error& error);

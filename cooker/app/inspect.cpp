@@ -31,11 +31,15 @@ std::vector<std::string> names(const PackData& d, const std::vector<uint32_t>& e
     return out;
 }
 
-// {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, so
-// that nothing nested without end is followed.
+// {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, and
+// what nests deeper is not even built.
 nlohmann::ordered_json settingsOf(const PackData& d) {
-    const auto all = nlohmann::ordered_json::parse(d.settings_json, nullptr, false);
-    auto settings = nlohmann::ordered_json::object();
+    using Json = nlohmann::ordered_json;
+    const auto shallow = [](int depth, Json::parse_event_t event, const Json&) {
+        return depth < 2 || (event != Json::parse_event_t::object_start && event != Json::parse_event_t::array_start);
+    };
+    const Json all = Json::parse(d.settings_json, shallow, false);
+    Json settings = Json::object();
     if (!all.is_object()) return settings;
     for (const auto& [key, setting] : all.items()) {
         if (!setting.is_object() || !setting.contains("value") || !setting.contains("from")) continue;

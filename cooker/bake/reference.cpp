@@ -28,6 +28,27 @@ float coverage(const RayScene& rays, uint32_t triangle, float u, float v) {
     return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
 }
 
+// The index at which the cumulated weights pass `target`.
+uint32_t pick(const std::vector<float>& weights, float target) {
+    uint32_t i = 0;
+    for (; i + 1 < weights.size() && target >= weights[i]; ++i) target -= weights[i];
+    return i;
+}
+
+// What a point light or spot shines into, steradians; directions are uniform over it.
+float solidAngle(const PunctualLight& light) {
+    return light.type == LightType::Spot ? 2 * pi * (1 - light.cone_outer_cos) : 4 * pi;
+}
+
+glm::vec3 lampDirection(const PunctualLight& light, glm::vec2 u) {
+    if (light.type != LightType::Spot) return uniformSphereDirection(u);
+    const float z = 1 - u.x * (1 - light.cone_outer_cos);
+    const float radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
+    glm::vec3 t, b;
+    orthonormalBasis(light.direction, t, b);
+    return t * (radius * std::cos(phi)) + b * (radius * std::sin(phi)) + light.direction * z;
+}
+
 uint32_t hashOf(glm::vec3 v, uint32_t seed) {
     for (int i = 0; i < 3; ++i) seed = hash(seed, std::bit_cast<uint32_t>(v[i]));
     return seed;
@@ -70,11 +91,9 @@ struct ReferenceTracer::Path {
 
 struct ReferenceTracer::Vertex {
     glm::vec3 point{0}, normal{0};
-    glm::vec3 surface_normal{0};  // as in ReferencePoint
-    float area_weight_sum = 0;    // of the emitters, as seen from here
-    bool below(glm::vec3 direction) const {
-        return surface_normal != glm::vec3(0) && glm::dot(direction, surface_normal) <= 0;
-    }
+    glm::vec3 reflectance{0};
+    float lamp_weight_sum = 0;  // of the lamps, as seen from here
+    float area_weight_sum = 0;  // of the emitters, as seen from here
 };
 
 void ReferenceTracer::Sources::add(glm::vec3 position, float source_power, float least_distance_squared) {
@@ -132,8 +151,7 @@ glm::vec3 ReferenceTracer::weightOf(std::optional<uint32_t> set) const {
 glm::vec3 ReferenceTracer::fromLight(const Light& light, const Vertex& vertex) const {
     const Illumination lit = illuminate(rays_.scene().lights[light.index], vertex.point);
     const float cos_surface = glm::dot(vertex.normal, lit.towards_light);
-    if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0) || vertex.below(lit.towards_light))
-        return glm::vec3(0);
+    if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0)) return glm::vec3(0);
     const float distance = std::isinf(lit.distance_m) ? far_m : lit.distance_m;
     return light.weight * lit.irradiance_lux *
            (cos_surface * rays_.transmittance(vertex.point, lit.towards_light, distance));
@@ -148,11 +166,14 @@ glm::vec3 ReferenceTracer::directPart(const Vertex& vertex) const {
     return sum;
 }
 
-glm::vec3 ReferenceTracer::punctual(const Vertex& vertex, Path& path) const {
+// At a vertex that was hit from `from`, with density `by_hit` per square metre.
+glm::vec3 ReferenceTracer::punctual(const Vertex& vertex, const Vertex& from, float by_hit, Path& path) const {
     glm::vec3 sum(0);
     for (const Light& sun : suns_) sum += fromLight(sun, vertex);
+    // lampBounce() finds this vertex as well.
+    const auto share = [&](uint32_t lamp) { return by_hit / (by_hit + lampPdf(from, lamp, vertex)); };
     if (lamps_.size() <= lamp_rays) {
-        for (const Light& lamp : lamps_) sum += fromLight(lamp, vertex);
+        for (uint32_t i = 0; i < lamps_.size(); ++i) sum += fromLight(lamps_[i], vertex) * share(i);
         return sum;
     }
     const float all = weigh(lamp_sources_, vertex.point, path.weights);
@@ -160,13 +181,51 @@ glm::vec3 ReferenceTracer::punctual(const Vertex& vertex, Path& path) const {
     // Systematic sampling: `lamp_rays` equal steps through the cumulated weights, one random shift.
     const float step = all / lamp_rays;
     float target = path.next() * step, cumulative = 0;
-    for (size_t i = 0; i < lamps_.size(); ++i) {
+    for (uint32_t i = 0; i < lamps_.size(); ++i) {
         cumulative += path.weights[i];
         float picked = 0;
         for (; target < cumulative; target += step) ++picked;
-        if (picked > 0) sum += fromLight(lamps_[i], vertex) * (picked * step / path.weights[i]);
+        if (picked > 0) sum += fromLight(lamps_[i], vertex) * (share(i) * picked * step / path.weights[i]);
     }
     return sum;
+}
+
+// The density per square metre with which lampBounce() from `from` finds the vertex `lit` by this lamp.
+float ReferenceTracer::lampPdf(const Vertex& from, uint32_t lamp, const Vertex& lit) const {
+    const Sources& s = lamp_sources_;
+    const PunctualLight& light = rays_.scene().lights[lamps_[lamp].index];
+    const glm::vec3 to_lamp = light.position_m - lit.point, apart = light.position_m - from.point;
+    const float distance2 = glm::dot(to_lamp, to_lamp);
+    if (!(distance2 > 0)) return 0;
+    const glm::vec3 direction = to_lamp / std::sqrt(distance2);
+    if (light.type == LightType::Spot && glm::dot(light.direction, -direction) < light.cone_outer_cos) return 0;
+    const float choice = s.power[lamp] / std::max(glm::dot(apart, apart), s.least_distance2[lamp]);
+    return choice / from.lamp_weight_sum * std::max(glm::dot(lit.normal, direction), 0.0f) /
+           (solidAngle(light) * distance2);
+}
+
+// Light of lamps that reaches `vertex` after one bounce: a lamp is picked, it shines somewhere, and that place is
+// connected to the vertex.
+glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
+    if (!(vertex.lamp_weight_sum > 0)) return glm::vec3(0);
+    weigh(lamp_sources_, vertex.point, path.weights);
+    const uint32_t lamp = pick(path.weights, path.next() * vertex.lamp_weight_sum);
+    const PunctualLight& light = rays_.scene().lights[lamps_[lamp].index];
+    const auto hit = rays_.nearest(light.position_m, lampDirection(light, path.next2()), far_m, path.nextBits());
+    const auto lit = hit ? vertexAt(*hit) : std::nullopt;
+    if (!lit) return glm::vec3(0);
+    const glm::vec3 to_lit = lit->point - vertex.point;
+    const float distance2 = glm::dot(to_lit, to_lit), distance = std::sqrt(distance2);
+    if (!(distance > 0)) return glm::vec3(0);
+    const glm::vec3 direction = to_lit / distance;
+    const float cos_here = glm::dot(vertex.normal, direction), cos_there = -glm::dot(lit->normal, direction);
+    const Illumination there = illuminate(light, lit->point);
+    const float cos_lamp = glm::dot(lit->normal, there.towards_light);
+    if (!(cos_here > 0) || !(cos_there > 0) || !(cos_lamp > 0)) return glm::vec3(0);
+    const float geometry = cos_here * cos_there / distance2;
+    return lit->reflectance / pi * lamps_[lamp].weight * there.irradiance_lux *
+           (cos_lamp * geometry * rays_.transmittance(vertex.point, direction, distance * (1 - 1e-4f)) /
+            (geometry / pi + lampPdf(vertex, lamp, *lit)));
 }
 
 // The density per steradian with which areaLight() finds a point of an emitter.
@@ -180,10 +239,8 @@ float ReferenceTracer::areaPdf(const Vertex& vertex, uint32_t area_light, float 
 
 glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     if (!(vertex.area_weight_sum > 0)) return glm::vec3(0);
-    float choice = path.next() * vertex.area_weight_sum;
+    const uint32_t chosen = pick(path.weights, path.next() * vertex.area_weight_sum);
     const glm::vec2 u = path.next2();
-    uint32_t chosen = 0;
-    for (; chosen + 1 < path.weights.size() && choice >= path.weights[chosen]; ++chosen) choice -= path.weights[chosen];
     const AreaLight& light = area_lights_[chosen];
     const float root = std::sqrt(u.x);
     const float a = root * (1 - u.y), b = root * u.y;
@@ -196,13 +253,25 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     const float facing = -glm::dot(direction, triangle.normal);
     const float cos_emitter = material.double_sided ? std::abs(facing) : facing;
     const float cos_surface = glm::dot(direction, vertex.normal);
-    if (!(cos_emitter > 0) || !(cos_surface > 0) || vertex.below(direction)) return glm::vec3(0);
+    if (!(cos_emitter > 0) || !(cos_surface > 0)) return glm::vec3(0);
     const float by_area = areaPdf(vertex, chosen, distance, cos_emitter), by_hit = cos_surface / pi;
     // What is cut out or blended shines by its alpha, as a ray that hits it finds.
     const float shown = coverage(rays_, light.triangle, a, b);
     return light.radiance_cd_m2 *
            (shown * cos_surface * rays_.transmittance(vertex.point, direction, distance * (1 - 1e-4f)) /
             (by_area + by_hit));
+}
+
+// The surface that was hit as the next vertex; empty where it reflects nothing.
+std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit) const {
+    const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
+    const Material& material = rays_.scene().materials[triangle.material];
+    if (hit.back && !material.double_sided) return std::nullopt;
+    if (rays_.scene().meshes[triangle.mesh].lighting == Lighting::None) return std::nullopt;
+    const glm::vec3 normal = hit.back ? -triangle.normal : triangle.normal;
+    return Vertex{.point = rays_.pointOn(hit.triangle, hit.u, hit.v) + normal * start_offset_m,
+                  .normal = normal,
+                  .reflectance = material.reflectance(glm::vec3(rays_.surfaceColor(hit.triangle, hit.u, hit.v)))};
 }
 
 // One path's estimate of the stored irradiance at its first point, without the noiseless direct part.
@@ -212,7 +281,8 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
     // From radiance at the next hit to irradiance here, for cosine-distributed rays.
     glm::vec3 throughput(pi);
     for (int i = 0; i < vertices_max; ++i) {
-        if (i > 0) sum += throughput / pi * punctual(vertex, path);
+        vertex.lamp_weight_sum = weigh(lamp_sources_, vertex.point, path.weights);
+        sum += throughput / pi * lampBounce(vertex, path);
         vertex.area_weight_sum = weigh(area_sources_, vertex.point, path.weights);
         sum += throughput / pi * areaLight(vertex, path);
         if (i > roulette_after) {
@@ -224,22 +294,20 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         orthonormalBasis(vertex.normal, t, b);
         const glm::vec3 d = cosineDirection(path.next2());
         const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
-        if (vertex.below(direction)) return sum;
         const auto hit = rays_.nearest(vertex.point, direction, far_m, path.nextBits());
         if (!hit) return sum + throughput * scene.sky_radiance_cd_m2 * options_.always_weight;
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
-        const Material& material = scene.materials[triangle.material];
-        if (hit->back && !material.double_sided) return sum;
-        if (const uint32_t light = area_light_of_[hit->triangle]; light != none) {
-            const float by_hit = d.z / pi;
-            const float cos_emitter = std::abs(glm::dot(direction, triangle.normal));
-            const float by_area = areaPdf(vertex, light, hit->distance_m, cos_emitter);
-            sum += throughput * area_lights_[light].radiance_cd_m2 * (by_hit / (by_hit + by_area));
-        }
-        if (scene.meshes[triangle.mesh].lighting == Lighting::None) return sum;
-        const glm::vec3 normal = hit->back ? -triangle.normal : triangle.normal;
-        vertex = {.point = rays_.pointOn(hit->triangle, hit->u, hit->v) + normal * start_offset_m, .normal = normal};
-        throughput *= material.reflectance(glm::vec3(rays_.surfaceColor(hit->triangle, hit->u, hit->v)));
+        if (hit->back && !scene.materials[triangle.material].double_sided) return sum;
+        const float by_hit = d.z / pi, cos_there = std::abs(glm::dot(direction, triangle.normal));
+        if (const uint32_t light = area_light_of_[hit->triangle]; light != none)
+            sum += throughput * area_lights_[light].radiance_cd_m2 *
+                   (by_hit / (by_hit + areaPdf(vertex, light, hit->distance_m, cos_there)));
+        auto next = vertexAt(*hit);
+        if (!next) return sum;
+        throughput *= next->reflectance;
+        const float distance2 = std::max(hit->distance_m * hit->distance_m, 1e-12f);
+        sum += throughput / pi * punctual(*next, vertex, by_hit * cos_there / distance2, path);
+        vertex = *next;
     }
     return sum;
 }
@@ -251,10 +319,9 @@ ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t
 }
 
 void ReferenceTracer::refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const {
-    const glm::vec3 up = point.surface_normal == glm::vec3(0) ? point.normal : point.surface_normal;
-    const Vertex start{.point = point.position_m + up * start_offset_m,
-                       .normal = point.normal,
-                       .surface_normal = point.surface_normal};
+    Vertex start;
+    start.point = point.position_m + point.normal * start_offset_m;
+    start.normal = point.normal;
     const glm::vec3 direct = directPart(start);
     // By place: the errors of two points are independent. Not by state: differences between states have less noise.
     const uint32_t seed = hashOf(point.normal, hashOf(point.position_m, options_.seed));

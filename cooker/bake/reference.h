@@ -29,12 +29,10 @@ struct ReferenceValue {
     float luminance_error_lux = 0;
 };
 
-// Where irradiance is asked for.
+// Where irradiance is asked for: everything that the normal's hemisphere sees counts, so a normal that is tilted
+// against its surface sees some of that surface.
 struct ReferencePoint {
     glm::vec3 position_m, normal;
-    // The normal of the surface that the point lies on, where `normal` is tilted against it: light from below the
-    // surface is left out, and so is what the surface itself would send to a tilted normal. Zero: nothing left out.
-    glm::vec3 surface_normal{0};
 };
 
 // Running mean and variance over paths (Welford 1962) of red, green, blue and luminance.
@@ -51,8 +49,10 @@ class ReferenceEstimate {
 
 // Thread-safe. The component that a pack stores: indirect light, and direct light of emitters, the sky and lights baked
 // with BakeMode::Full. Doors stand as `rays` has them. Paths with next-event estimation at every vertex: emitters
-// combined with hits by the balance heuristic, punctual lights picked by what they would do unshadowed; Russian
-// roulette after three bounces. Unbiased.
+// combined with hits by the balance heuristic (Veach 1995), lamps picked by what they would do unshadowed. What a lamp
+// lights close by is small and bright, and paths rarely find it: so the lamp shines at random too, and where that falls
+// is connected to the vertex, combined with the paths' own hits likewise. Russian roulette after three bounces.
+// Unbiased.
 class ReferenceTracer {
    public:
     ReferenceTracer(const RayScene& rays, const ReferenceOptions& options);
@@ -84,7 +84,10 @@ class ReferenceTracer {
     glm::vec3 weightOf(std::optional<uint32_t> set) const;
     glm::vec3 fromLight(const Light& light, const Vertex& vertex) const;
     glm::vec3 directPart(const Vertex& vertex) const;
-    glm::vec3 punctual(const Vertex& vertex, Path& path) const;
+    glm::vec3 punctual(const Vertex& vertex, const Vertex& from, float by_hit, Path& path) const;
+    glm::vec3 lampBounce(const Vertex& vertex, Path& path) const;
+    float lampPdf(const Vertex& from, uint32_t lamp, const Vertex& lit) const;
+    std::optional<Vertex> vertexAt(const Hit& hit) const;
     glm::vec3 areaLight(const Vertex& vertex, Path& path) const;
     float areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const;
     glm::vec3 trace(Vertex vertex, Path& path) const;

@@ -69,10 +69,11 @@ void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
         }
         if (!signature.empty()) members[signature].push_back(t);
     }
-    // Clusters in page order, so that neighbours in the file are neighbours on the page.
+    // Clusters by their number of contributions, as updates take them, and in page order among equals: what a dispatch
+    // reads lies together, and neighbours in the file are neighbours on the page.
     std::vector<const std::pair<const std::vector<uint32_t>, std::vector<uint32_t>>*> order;
     for (const auto& cluster : members) order.push_back(&cluster);
-    std::ranges::sort(order, {}, [](const auto* c) { return c->second.front(); });
+    std::ranges::sort(order, {}, [](const auto* c) { return std::pair(c->first.size(), c->second.front()); });
 
     std::vector<std::vector<TexelRecord>> payloads(pack.contributions.size());
     for (const auto* cluster : order) {

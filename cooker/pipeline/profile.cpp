@@ -57,15 +57,12 @@ std::unexpected<Error> bad(const std::string& source, const std::string& text) {
     return fail(ErrorCode::BadInput, fmt::format("profile {}: {}", source, text));
 }
 
-// A profile nests three deep ("bake", "draft", "rays"); what goes deeper is nobody's setting and need not be followed.
-constexpr int nesting_max = 3;
-
 // Flattens nested objects to dotted keys.
-void flatten(const json& object, const std::string& prefix, int depth, std::map<std::string, json>& out) {
+void flatten(const json& object, const std::string& prefix, std::map<std::string, json>& out) {
     for (const auto& [key, value] : object.items()) {
         const std::string path = prefix.empty() ? key : prefix + "." + key;
-        if (value.is_object() && depth < nesting_max)
-            flatten(value, path, depth + 1, out);
+        if (value.is_object())
+            flatten(value, path, out);
         else
             out[path] = value;
     }
@@ -104,9 +101,20 @@ struct Source {
     std::string text;
 };
 
+// A profile nests three deep ("bake", "draft", "rays"). What goes deeper is not built: the library follows it with one
+// stack frame per level.
+constexpr int nesting_max = 3;
+
 Expected<json> parseObject(const Source& source) {
+    bool too_deep = false;
+    const auto shallow = [&](int depth, json::parse_event_t event, const json&) {
+        const bool start = event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
+        too_deep = too_deep || (start && depth >= nesting_max);
+        return !too_deep;
+    };
     try {
-        json root = json::parse(source.text);
+        json root = json::parse(source.text, shallow);
+        if (too_deep) return bad(source.name, "it nests deeper than any setting");
         if (root.is_object()) return root;
         return bad(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
     } catch (const json::exception& error) {
@@ -153,7 +161,7 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     if (auto ok = applyBase(profile, *root, source, depth); !ok) return ok;
     const auto settings = settingsOf(profile);
     std::map<std::string, json> values;
-    flatten(*root, "", 1, values);
+    flatten(*root, "", values);
     for (const auto& [key, value] : values) {
         if (key == "extends" || key == "description") continue;
         const auto it = std::ranges::find(settings, key, &Setting::key);

@@ -3,31 +3,45 @@
 #include <format/texel.h>
 #include <update/planner.h>
 
+#include <array>
 #include <chrono>
 
 namespace dimmer {
 namespace {
-
-// The twin of main() in shaders/blend_texels.comp.
-TexelRecord blendTexel(TexelRecord base, std::span<const WorkTerm> terms, std::span<const TexelRecord> payload,
-                       uint32_t receiver) {
-    // With nothing on, the page shows the base as cooked: decoding and encoding may move its direction by a quantum.
-    if (terms.empty()) return base;
-    TexelBlend blend;
-    blend.add(base, 1, 1, 1);
-    for (const WorkTerm& term : terms)
-        blend.add(payload[term.payload_bias + receiver], term.weight_r, term.weight_g, term.weight_b);
-    return blend.encode();
-}
 
 size_t texelIndex(const PackData& data, uint32_t address) {
     return (size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address)) * data.page_width +
            TexelAddress::x(address);
 }
 
-TexelRecord baseRecord(const PackData& data, size_t texel) {
-    const TexelRecord& record = data.base_pages[texel];
-    return {clampR11G11B10(record.irradiance), record.direction};
+TexelRecord canonical(const TexelRecord& record) {
+    return {canonicalR11G11B10(record.irradiance), record.direction};
+}
+
+using Records = std::array<TexelRecord, batch_receivers_max>;
+using Sums = std::array<TexelBlend, batch_receivers_max>;
+
+void add(Sums& sums, const TexelRecord* records, uint32_t count, float wr, float wg, float wb) {
+    for (uint32_t i = 0; i < count; ++i) sums[i].add(canonical(records[i]), wr, wg, wb);
+}
+
+// The twin of shaders/blend_texels.comp for one batch. Term by term over all receivers: records are read as they
+// lie, and the compiler vectorises the loops.
+void blendBatch(const WorkItem& item, std::span<const WorkTerm> terms, const PackData& data, Records& records) {
+    const Batch& batch = data.batches[item.batch];
+    for (uint32_t i = 0; i < batch.receiver_count; ++i)
+        records[i] = canonical(data.base_pages[texelIndex(data, data.addresses[batch.first_receiver + i])]);
+    // With nothing on, the page shows the base as cooked.
+    if (terms.empty()) return;
+    const Cluster& cluster = data.clusters[item.cluster];
+    Sums sums{};
+    add(sums, records.data(), batch.receiver_count, weight_scale, weight_scale, weight_scale);
+    for (const WorkTerm& term : terms) {
+        const uint32_t first = data.terms[cluster.first_term + term.slot].first_record;
+        add(sums, &data.payload[first + (batch.first_receiver - cluster.first_receiver)], batch.receiver_count,
+            term.weight_r, term.weight_g, term.weight_b);
+    }
+    for (uint32_t i = 0; i < batch.receiver_count; ++i) records[i] = sums[i].encode();
 }
 
 }  // namespace
@@ -37,7 +51,7 @@ CpuRuntime::CpuRuntime(const Pack& pack) : LightState(pack) {
     irradiance_.resize(data.base_pages.size());
     direction_.resize(data.base_pages.size());
     for (size_t i = 0; i < data.base_pages.size(); ++i) {
-        const TexelRecord base = baseRecord(data, i);
+        const TexelRecord base = canonical(data.base_pages[i]);
         irradiance_[i] = base.irradiance;
         direction_[i] = base.direction;
     }
@@ -50,14 +64,15 @@ UpdateStats CpuRuntime::update() {
     if (any) {
         const PackData& data = pack().data();
         const WorkList& work = planner().work();
+        Records records;
         for (const WorkGroup& group : work.groups) stats.dispatches += group.item_count > 0;
         for (const WorkItem& item : work.items) {
-            const auto terms = work.terms.subspan(item.first_term, item.term_count);
-            for (uint32_t i = item.first_receiver; i < item.first_receiver + item.receiver_count; ++i) {
-                const size_t texel = texelIndex(data, data.addresses[i]);
-                const TexelRecord blended = blendTexel(baseRecord(data, texel), terms, data.payload, i);
-                irradiance_[texel] = blended.irradiance;
-                direction_[texel] = blended.direction;
+            blendBatch(item, work.terms.subspan(item.first_term, item.term_count), data, records);
+            const Batch& batch = data.batches[item.batch];
+            for (uint32_t i = 0; i < batch.receiver_count; ++i) {
+                const size_t texel = texelIndex(data, data.addresses[batch.first_receiver + i]);
+                irradiance_[texel] = records[i].irradiance;
+                direction_[texel] = records[i].direction;
             }
         }
     }

@@ -23,18 +23,18 @@ Tap tap(float coordinate, uint32_t size) {
     return {first, std::min(first + 1, size - 1), position - static_cast<float>(first)};
 }
 
-// What the sampler returns: stored irradiance, and the first three bytes of the direction as unorm.
+// What the sampler returns: stored irradiance, and the three codes of the direction as unorm.
 using Sample = std::array<float, 6>;
 
 Sample decode(uint32_t irradiance, uint32_t direction) {
     const auto [r, g, b] = decodeR11G11B10(irradiance);
-    constexpr float unorm = 1.0f / 255.0f;
+    constexpr float unorm = 1.0f / 1023.0f;
     return {r,
             g,
             b,
-            static_cast<float>(direction & 0xff) * unorm,
-            static_cast<float>(direction >> 8 & 0xff) * unorm,
-            static_cast<float>(direction >> 16 & 0xff) * unorm};
+            static_cast<float>(direction & 0x3ff) * unorm,
+            static_cast<float>(direction >> 10 & 0x3ff) * unorm,
+            static_cast<float>(direction >> 20 & 0x3ff) * unorm};
 }
 
 Sample mix(const Sample& a, const Sample& b, float share_of_b) {
@@ -57,7 +57,7 @@ std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> 
     const Sample s = mix(mix(texel(x.first, y.first), texel(x.second, y.first), x.second_share),
                          mix(texel(x.first, y.second), texel(x.second, y.second), x.second_share), y.second_share);
 
-    const Highlight h = highlightFromBytes(s[3], (s[4] * 255.0f - 128.0f) / 127.0f, (s[5] * 255.0f - 128.0f) / 127.0f);
+    const Highlight h = highlightFromUnorm(s[3], s[4], s[5]);
     const float highlight =
         h.bx * normal_tangent[0] + h.by * normal_tangent[1] + (1.0f - h.ambient) * normal_tangent[2];
     const float scale = (h.ambient + std::max(0.0f, highlight)) / pack.exposure();

@@ -12,7 +12,7 @@ namespace dimmer {
 namespace {
 
 constexpr VkFormat irradiance_format = VK_FORMAT_B10G11R11_UFLOAT_PACK32;
-constexpr VkFormat direction_format = VK_FORMAT_R8G8B8A8_UNORM;
+constexpr VkFormat direction_format = VK_FORMAT_A2B10G10R10_UNORM_PACK32;
 constexpr VkFormat storage_format = VK_FORMAT_R32_UINT;
 
 // Storage through a view of another format than the image's, which itself need not support storage.
@@ -83,7 +83,8 @@ Expected<LightmapPages> LightmapPages::create(const VulkanContext& vulkan, const
     pages.sampling_stages_ = samplingStages(vulkan);
     DIMMER_TRY(
         checkSupport(vulkan, irradiance_format, "B10G11R11_UFLOAT_PACK32", pages.width_, pages.height_, pages.layers_));
-    DIMMER_TRY(checkSupport(vulkan, direction_format, "R8G8B8A8_UNORM", pages.width_, pages.height_, pages.layers_));
+    DIMMER_TRY(
+        checkSupport(vulkan, direction_format, "A2B10G10R10_UNORM_PACK32", pages.width_, pages.height_, pages.layers_));
 
     auto irradiance = pages.createArray(vulkan, irradiance_format);
     if (!irradiance) return std::unexpected(std::move(irradiance.error()));
@@ -209,7 +210,7 @@ Expected<void> LightmapPages::fill(const PackData& data, Transfer& transfer) {
         DIMMER_TRY(forEachPiece([&](const VkBufferImageCopy& region, size_t first, size_t count) {
             for (size_t i = 0; i < count; ++i) {
                 const TexelRecord& record = data.base_pages[first + i];
-                staging[i] = irradiance ? clampR11G11B10(record.irradiance) : record.direction;
+                staging[i] = irradiance ? canonicalR11G11B10(record.irradiance) : record.direction;
             }
             return transfer.run([&](VkCommandBuffer commands) {
                 vkCmdCopyBufferToImage(commands, transfer.staging().buffer.get(), image,

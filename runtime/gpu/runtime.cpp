@@ -2,6 +2,7 @@
 
 #include <gpu/lightmap_pages.h>
 #include <gpu/texel_blender.h>
+#include <gpu/texel_executor.h>
 #include <gpu/update_timer.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
@@ -39,7 +40,7 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
 struct Runtime::Impl {
     VulkanContext vulkan;
     LightmapPages pages;
-    std::optional<TexelBlender> blender;  // none when the pack has no receivers
+    std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
     SemaphoreHandle timeline;
@@ -51,8 +52,8 @@ struct Runtime::Impl {
 
     Expected<void> create(const PackData& data, const Planner& planner, const RuntimeOptions& options);
     Expected<void> waitForSubmitted() const;
-    void recordUpdate(VkCommandBuffer commands, const WorkList& work);
-    Expected<void> submitUpdate(const WorkList& work);
+    void recordUpdate(VkCommandBuffer commands, const Planner& planner);
+    Expected<void> submitUpdate(const Planner& planner);
 };
 
 Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const RuntimeOptions& options) {
@@ -66,9 +67,9 @@ Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planne
     timeline = std::move(*made_timeline);
     if (data.payload.empty()) return {};  // nothing can ever change
 
-    auto made_blender = TexelBlender::create(vulkan, data, planner, pages, *transfer);
-    if (!made_blender) return std::unexpected(std::move(made_blender.error()));
-    blender = std::move(*made_blender);
+    auto made_executor = createExecutor(vulkan, options.mode, data, planner, pages, *transfer);
+    if (!made_executor) return std::unexpected(std::move(made_executor.error()));
+    executor = std::move(*made_executor);
     if (options.timestamps) {
         auto made_timer = UpdateTimer::create(vulkan);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
@@ -91,22 +92,22 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
     return {};
 }
 
-void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const WorkList& work) {
-    blender->write(work);
+void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner) {
+    executor->write(planner);
     if (timer) timer->reset(commands);
     pages.beginWrites(commands);
     if (timer) timer->begin(commands);
-    stats.dispatches = blender->dispatch(commands, work);
+    stats.dispatches = executor->dispatch(commands, planner);
     if (timer) timer->end(commands);
     pages.endWrites(commands);
     timed = timer.has_value();
 }
 
-Expected<void> Runtime::Impl::submitUpdate(const WorkList& work) {
+Expected<void> Runtime::Impl::submitUpdate(const Planner& planner) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, work);
+    recordUpdate(own.commands, planner);
     DIMMER_VK(vkEndCommandBuffer, own.commands);
 
     const VkSemaphore semaphore = timeline.get();
@@ -149,7 +150,7 @@ Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
             planner().rollback();
             return std::unexpected(std::move(done.error()));
         }
-        impl_->recordUpdate(commands, planner().work());
+        impl_->recordUpdate(commands, planner());
     }
     impl_->stats.host_us = microsecondsSince(start);
     return impl_->stats;
@@ -165,7 +166,7 @@ Expected<UpdateStats> Runtime::submit() {
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
-    if (sent) sent = impl_->submitUpdate(planner().work());
+    if (sent) sent = impl_->submitUpdate(planner());
     if (!sent) {
         planner().rollback();
         impl_->timed = false;

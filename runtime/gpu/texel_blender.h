@@ -1,39 +1,34 @@
 // The kernel shaders/blend_texels.comp with its buffers: executes work lists on lightmap pages.
 #pragma once
 
-#include <gpu/lightmap_pages.h>
-#include <update/planner.h>
+#include <gpu/kernel.h>
+#include <gpu/texel_executor.h>
 
 #include <array>
 
 namespace dimmer {
 
-class TexelBlender {
+class TexelBlender : public TexelExecutor {
    public:
-    // Uploads addresses, base and payload (blocking), and makes one pipeline per number of contributions that can be
-    // on. Unsupported where the device's limits are too small for the pack.
+    // Uploads addresses, base and payload (blocking), and makes one pipeline per group of work that clusters can fall
+    // into. Unsupported where the device's limits are too small for the pack.
     static Expected<TexelBlender> create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                         const LightmapPages& pages, Transfer& transfer);
+                                         const LightmapPages& pages, Transfer& transfer, bool per_combination);
 
-    // Copies the work list to the device's view of it: the dispatches of the previous one must have completed.
-    void write(const WorkList& work);
-    // Records the dispatches, without barriers. Returns their number.
-    uint32_t dispatch(VkCommandBuffer commands, const WorkList& work) const;
+    void write(const Planner& planner) override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
 
    private:
-    Expected<void> createBuffers(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                 Transfer& transfer);
-    Expected<void> createLayouts(VkDevice device);
-    Expected<void> createDescriptors(VkDevice device, const LightmapPages& pages);
-    Expected<void> createPipelines(VkDevice device, uint32_t overlap_max);
+    Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
+                                Transfer& transfer);
+    Expected<void> createKernel(VkDevice device, const Planner& planner, const LightmapPages& pages);
+    void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
+    uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 
-    GpuBuffer addresses_, base_, payload_, items_, terms_;
-    SetLayoutHandle set_layout_;
-    PipelineLayoutHandle pipeline_layout_;
-    DescriptorPoolHandle descriptor_pool_;
-    VkDescriptorSet descriptors_ = VK_NULL_HANDLE;
-    std::array<PipelineHandle, work_group_count> pipelines_;
+    TexelBuffer addresses_, base_, payload_, work_, terms_, places_, first_records_;
+    Kernel kernel_;
     uint32_t groups_x_max_ = 0;
+    bool per_combination_ = false;  // a dispatch per cluster, as UBERBAKE's section 3.3 describes
 };
 
 }  // namespace dimmer

@@ -36,6 +36,7 @@ class DeviceHandle {
 };
 
 using BufferHandle = DeviceHandle<VkBuffer, vkDestroyBuffer>;
+using BufferViewHandle = DeviceHandle<VkBufferView, vkDestroyBufferView>;
 using ImageHandle = DeviceHandle<VkImage, vkDestroyImage>;
 using ImageViewHandle = DeviceHandle<VkImageView, vkDestroyImageView>;
 using MemoryHandle = DeviceHandle<VkDeviceMemory, vkFreeMemory>;

@@ -1,5 +1,7 @@
 #include <update/planner.h>
 
+#include <format/texel.h>
+
 #include <bit>
 
 namespace dimmer {
@@ -42,6 +44,7 @@ Planner::Planner(const PackData& data) : data_(data) {
     changes_.reserve(data.contributions.size());
     cluster_marks_.resize((data.clusters.size() + 63) / 64);
     changed_clusters_.reserve(data.clusters.size());
+    cluster_terms_.reserve(data.clusters.size());
     items_.resize(itemsMax());
     terms_.reserve(termsMax());
 
@@ -86,7 +89,8 @@ Weight Planner::product(const Contribution& contribution) const {
     for (uint32_t door : contribution.doors_open) doors *= elements_[door].r;
     for (uint32_t door : contribution.doors_closed) doors *= 1.0f - elements_[door].r;
     const Weight dim = contribution.light_set ? elements_[*contribution.light_set] : Weight();
-    return {dim.r * doors, dim.g * doors, dim.b * doors};
+    const auto bounded = [doors](float channel) { return std::min(channel * doors, planned_weight_max); };
+    return {bounded(dim.r), bounded(dim.g), bounded(dim.b)};
 }
 
 void Planner::collectChanges() {
@@ -126,43 +130,35 @@ void Planner::collectClusters() {
     }
 }
 
-uint32_t Planner::countOn(const Cluster& cluster) const {
-    uint32_t on = 0;
-    for (uint32_t t = 0; t < cluster.term_count; ++t)
-        on += isOn(planned_[data_.terms[cluster.first_term + t].contribution]);
-    return on;
-}
-
-void Planner::emitTerms(const Cluster& cluster) {
-    for (uint32_t t = 0; t < cluster.term_count; ++t) {
-        const ClusterTerm& term = data_.terms[cluster.first_term + t];
-        const Weight& w = planned_[term.contribution];
-        if (isOn(w)) terms_.push_back({term.first_record - cluster.first_receiver, w.r, w.g, w.b});
+// Lists the cluster's terms that are on, and counts.
+Planner::Terms Planner::planCluster(const Cluster& cluster) {
+    const auto first_term = static_cast<uint32_t>(terms_.size());
+    for (uint32_t slot = 0; slot < cluster.term_count; ++slot) {
+        const Weight& w = planned_[data_.terms[cluster.first_term + slot].contribution];
+        if (isOn(w)) terms_.push_back({slot, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale});
     }
+    const uint32_t on = static_cast<uint32_t>(terms_.size()) - first_term;
+    work_.groups[workGroupOf(on)].item_count += cluster.batch_count;
+    ++stats_.clusters;
+    stats_.batches += cluster.batch_count;
+    stats_.receivers += cluster.receiver_count;
+    stats_.bytes_read += uint64_t{cluster.receiver_count} * (sizeof(uint32_t) + sizeof(TexelRecord) * (1 + on));
+    stats_.bytes_written += uint64_t{cluster.receiver_count} * sizeof(TexelRecord);
+    return {first_term, on};
 }
 
 void Planner::emitWork() {
-    for (uint32_t i : changed_clusters_)
-        work_.groups[workGroupOf(countOn(data_.clusters[i]))].item_count += data_.clusters[i].batch_count;
+    cluster_terms_.clear();
+    for (uint32_t i : changed_clusters_) cluster_terms_.push_back(planCluster(data_.clusters[i]));
     std::array<uint32_t, work_group_count> next{};
     for (uint32_t g = 1; g < work_group_count; ++g)
         next[g] = work_.groups[g].first_item = work_.groups[g - 1].first_item + work_.groups[g - 1].item_count;
-
-    for (uint32_t i : changed_clusters_) {
-        const Cluster& cluster = data_.clusters[i];
-        const auto first_term = static_cast<uint32_t>(terms_.size());
-        emitTerms(cluster);
-        const uint32_t on = static_cast<uint32_t>(terms_.size()) - first_term;
-        for (uint32_t b = 0; b < cluster.batch_count; ++b) {
-            const Batch& batch = data_.batches[cluster.first_batch + b];
-            items_[next[workGroupOf(on)]++] = {batch.first_receiver, batch.receiver_count, first_term, on};
-        }
-
-        ++stats_.clusters;
-        stats_.batches += cluster.batch_count;
-        stats_.receivers += cluster.receiver_count;
-        stats_.bytes_read += uint64_t{cluster.receiver_count} * (sizeof(uint32_t) + sizeof(TexelRecord) * (1 + on));
-        stats_.bytes_written += uint64_t{cluster.receiver_count} * sizeof(TexelRecord);
+    for (size_t c = 0; c < changed_clusters_.size(); ++c) {
+        const Cluster& cluster = data_.clusters[changed_clusters_[c]];
+        const Terms& terms = cluster_terms_[c];
+        uint32_t& item = next[workGroupOf(terms.count)];
+        for (uint32_t b = 0; b < cluster.batch_count; ++b)
+            items_[item++] = {cluster.first_batch + b, terms.first, terms.count, changed_clusters_[c]};
     }
 }
 

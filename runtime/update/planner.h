@@ -12,13 +12,13 @@
 
 namespace dimmer {
 
-// Batches are grouped by the number of contributions that are on: groups 0..8 have a kernel without a loop counter to
-// load, the last group holds every batch with more. One dispatch per group that is not empty.
-inline constexpr uint32_t specialised_terms_max = 8;
-inline constexpr uint32_t work_group_count = specialised_terms_max + 2;
+// Work is grouped by the number of contributions that are on: each group has a kernel of its own, unrolled up to 16 of
+// them. One dispatch per group that is not empty.
+inline constexpr std::array<uint32_t, 11> unrolled_terms = {0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16};
+inline constexpr uint32_t work_group_count = unrolled_terms.size() + 1;  // the last one: any number, in a loop
 
 inline uint32_t workGroupOf(uint32_t terms_on) {
-    return std::min(terms_on, specialised_terms_max + 1);
+    return static_cast<uint32_t>(std::ranges::lower_bound(unrolled_terms, terms_on) - unrolled_terms.begin());
 }
 
 struct WorkGroup {
@@ -32,6 +32,9 @@ struct WorkList {
     std::span<const WorkTerm> terms;
     std::array<WorkGroup, work_group_count> groups{};
 };
+
+// Weights above this are taken as this: every texel they touch is as bright as the format goes.
+inline constexpr float planned_weight_max = 0x1p27f;
 
 class Planner {
    public:
@@ -50,6 +53,9 @@ class Planner {
     void rollback();
 
     const WorkList& work() const { return work_; }
+    // As the last plan() left it; 0 is off.
+    const Weight& plannedWeight(uint32_t contribution) const { return planned_[contribution]; }
+    uint32_t contributionCount() const { return static_cast<uint32_t>(planned_.size()); }
     // Everything but dispatches and times.
     const UpdateStats& stats() const { return stats_; }
 
@@ -75,8 +81,12 @@ class Planner {
     void markDirty(uint32_t contribution);
     void collectChanges();
     void collectClusters();
-    uint32_t countOn(const Cluster& cluster) const;
-    void emitTerms(const Cluster& cluster);
+    // The terms that are on in a cluster, in terms_.
+    struct Terms {
+        uint32_t first = 0, count = 0;
+    };
+
+    Terms planCluster(const Cluster& cluster);
     void emitWork();
 
     const PackData& data_;
@@ -91,6 +101,7 @@ class Planner {
     std::vector<Change> changes_;             // of the last plan
     std::vector<uint64_t> cluster_marks_;     // one bit per cluster
     std::vector<uint32_t> changed_clusters_;  // ascending
+    std::vector<Terms> cluster_terms_;        // of changed_clusters_
     std::vector<WorkItem> items_;
     std::vector<WorkTerm> terms_;
     WorkList work_;

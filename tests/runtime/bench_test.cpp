@@ -30,7 +30,7 @@ TEST_F(BenchTest, CountsWhatEachCaseTouches) {
     ASSERT_TRUE(done) << done.error().message;
     const auto json = nlohmann::json::parse(out.str());
     for (const char* key : {"device", "driver", "pack", "command", "cases"}) EXPECT_TRUE(json.contains(key)) << key;
-    ASSERT_EQ(json["cases"].size(), 1 + 4 + 1 + 1u);  // nothing, sets, doors, all sets
+    ASSERT_EQ(json["cases"].size(), 1 + 4 + 1 + 1 + 1u);  // nothing, sets, doors, two sets, all sets
 
     const auto& nothing = json["cases"][0];
     EXPECT_EQ(nothing["name"], "nothing changed");

@@ -36,7 +36,7 @@ TEST(CpuRuntime, AddsWhatTheWeightSays) {
     test::Random random(1);
     const test::ClusterPlan plans[] = {{{0}, 1}};
     test::fillPack(data, plans, random);
-    constexpr uint32_t none = 255u | 128u << 8 | 128u << 16;
+    constexpr uint32_t none = 1023u | 512u << 10 | 512u << 20;
     data.base_pages[0] = {encodeR11G11B10(1, 2, 3), none};
     data.payload[0] = {encodeR11G11B10(4, 8, 16), none};
 

@@ -29,7 +29,7 @@ inline uint32_t floorUfloatCode(double value, int mantissa_bits) {
     int exponent = 0;
     const double fraction = std::frexp(value, &exponent);  // value = fraction * 2^exponent, fraction in [0.5, 1)
     const double scale = std::ldexp(1.0, mantissa_bits);
-    if (exponent - 1 < -14) return static_cast<uint32_t>(value * std::ldexp(scale, 14));
+    if (exponent - 1 < -14) return 0;  // the format's users keep no denormal codes
     const auto mantissa = static_cast<uint32_t>((fraction * 2 - 1) * scale);
     return static_cast<uint32_t>(exponent - 1 + 15) << mantissa_bits | mantissa;
 }
@@ -43,7 +43,7 @@ inline uint32_t randomIrradiance(Random& random, float exposure) {
 
 // Any ambient share, and a highlight that may point along the surface or past what the share allows.
 inline uint32_t randomDirection(Random& random) {
-    return pick(random, 0, 255) | pick(random, 1, 255) << 8 | pick(random, 1, 255) << 16;
+    return pick(random, 0, 1023) | pick(random, 1, 1023) << 10 | pick(random, 1, 1023) << 20;
 }
 
 inline TexelRecord randomRecord(Random& random, float exposure) {

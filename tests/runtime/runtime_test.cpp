@@ -89,7 +89,7 @@ TEST_F(RuntimeTest, AnyHistoryEndsInTheStateOfAFreshRuntime) {
     EXPECT_EQ(a->direction, b->direction);
 }
 
-// All 2^16 highlights at 16 ambient shares, next to a base that has one as well.
+// All 2^20 highlights, each with some ambient share, next to a base that has one as well.
 TEST_F(RuntimeTest, AgreesWithTheCpuForEveryHighlight) {
     PackData data = test::emptyPack(1, 0);
     data.page_count = 16;
@@ -97,7 +97,7 @@ TEST_F(RuntimeTest, AgreesWithTheCpuForEveryHighlight) {
     test::Random random(8);
     const test::ClusterPlan plans[] = {{{0}, 1u << 20}};
     test::fillPack(data, plans, random);
-    for (uint32_t i = 0; i < data.payload.size(); ++i) data.payload[i].direction = (i >> 16) * 17 | (i & 0xffff) << 8;
+    for (uint32_t i = 0; i < data.payload.size(); ++i) data.payload[i].direction = i * 37 % 1024 | i << 10;
     const Pack pack = packOf(std::move(data));
     Runtime gpu = runtimeOf(pack);
     CpuRuntime cpu(pack);
@@ -207,20 +207,23 @@ TEST_F(RuntimeTest, OneSetToggledRunsExactlyTheBatchesThatHoldIt) {
     }
 }
 
-// More batches than one side of a dispatch may have on common devices: the grid is cut into rows.
-TEST_F(RuntimeTest, MoreBatchesThanOneSideOfADispatch) {
+// More workgroups than one side of a dispatch may have on common devices (65535, of 8 items each): the grid is cut into
+// rows.
+TEST_F(RuntimeTest, MoreWorkgroupsThanOneSideOfADispatch) {
     PackData data = test::emptyPack(2, 0);
     data.page_count = 1;
-    data.page_width = data.page_height = 512;
+    data.page_width = data.page_height = 1024;
     test::Random random(10);
-    const test::ClusterPlan plans[] = {{{0}, 150000}, {{0, 1}, 70000}};
-    test::fillPack(data, plans, random, 1);
+    // Clusters of one receiver each.
+    std::vector<test::ClusterPlan> plans(530000, {{0}, 1});
+    plans.resize(600000, {{0, 1}, 1});
+    test::fillPack(data, plans, random);
     const Pack pack = packOf(std::move(data));
     Runtime gpu = runtimeOf(pack);
     CpuRuntime cpu(pack);
     const auto stats = gpu.submit();
     ASSERT_TRUE(stats);
-    EXPECT_EQ(stats->batches, 220000u);
+    EXPECT_EQ(stats->batches, 600000u);
     EXPECT_EQ(stats->dispatches, 2u);
     cpu.update();
     expectEqualPages(gpu, cpu);
@@ -258,25 +261,28 @@ TEST_F(RuntimeTest, UploadsAndReadsLargePagesInPieces) {
     expectEqualPages(gpu, cpu);
 }
 
-TEST_F(RuntimeTest, APackThatDoesNotFitABufferIsRefusedWithFigures) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(device().context().physical_device, &properties);
-    const uint64_t range = properties.limits.maxStorageBufferRange;
-    if (range > 1ull << 28) GTEST_SKIP() << "this device binds " << range << " bytes; a test of that size is too much";
+// lavapipe binds 128 MiB as one storage buffer; records past that are read through texel buffers. 16 sets of 1.1 M
+// receivers: 141 MB of records.
+TEST_F(RuntimeTest, RecordsPast128MiB) {
     PackData data = test::emptyPack(16, 0);
     data.page_count = 1;
-    data.page_width = data.page_height = 2048;
+    data.page_width = 2048;
+    data.page_height = 560;
     test::ClusterPlan plan;
     for (uint32_t k = 0; k < 16; ++k) plan.contributions.push_back(k);
-    plan.receivers = static_cast<uint32_t>(range / 8 / 16 + 1);
+    plan.receivers = 1100000;
     test::Random random(13);
     test::fillPack(data, std::span(&plan, 1), random);
+    ASSERT_GT(data.payload.size() * sizeof(TexelRecord), 128u << 20);
     const Pack pack = packOf(std::move(data));
-    const auto refused = Runtime::create(device().context(), pack);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
-    EXPECT_THAT(refused.error().message, testing::HasSubstr(std::to_string(range)));
-    EXPECT_THAT(refused.error().message, testing::HasSubstr(std::to_string(uint64_t{plan.receivers} * 16 * 8)));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    for (const char* state : {"all=1", "all=0,set15=1"}) {
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
 }
 
 TEST_F(RuntimeTest, ANullContextIsRefused) {

@@ -152,11 +152,11 @@ Pack smoothPack() {
     for (uint32_t page = 0; page < 2; ++page)
         for (uint32_t y = 0; y < 8; ++y)
             for (uint32_t x = 0; x < 16; ++x) {
-                // r = 64/255, |m| at most 64/127 of a share of 0.75: d_z at least 0.67.
+                // r = 0.25, |b_x| and |b_y| at most 0.7 of a share of 0.75.
                 const uint32_t irradiance = test::floorUfloatCode(10 + x + 50 * page, 6) |
                                             test::floorUfloatCode(20 + y, 6) << 11 |
                                             test::floorUfloatCode(30 - x, 5) << 22;
-                data.base_pages.push_back({irradiance, 64u | (128 - 45 + 6 * x) << 8 | (128 - 45 + 12 * y) << 16});
+                data.base_pages.push_back({irradiance, 256u | (512 - 27 + 3 * x) << 10 | (512 - 27 + 6 * y) << 20});
             }
     return valueOf(Pack::fromData(std::move(data)));
 }

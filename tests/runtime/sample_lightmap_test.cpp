@@ -8,7 +8,7 @@
 namespace dimmer {
 namespace {
 
-constexpr uint32_t no_direction = 255u | 128u << 8 | 128u << 16;
+constexpr uint32_t no_direction = 1023u | 512u << 10 | 512u << 20;
 
 // One page; exposure 2, so that forgetting it shows.
 Pack pageOf(uint32_t width, uint32_t height) {
@@ -26,27 +26,27 @@ Pack pageOf(uint32_t width, uint32_t height) {
 TEST(SampleLightmap, TheSurfacesOwnNormalGetsTheStoredIrradianceExactly) {
     const Pack pack = pageOf(1, 1);
     test::Random random(1);
-    for (uint32_t r8 = 0; r8 < 256; ++r8) {
+    for (uint32_t r10 = 0; r10 < 1024; r10 += 3) {
         for (int i = 0; i < 100; ++i) {
             const uint32_t irradiance = test::randomIrradiance(random, 1);
-            const uint32_t direction = r8 | (test::randomDirection(random) & 0xffff00);
+            const uint32_t direction = r10 | (test::randomDirection(random) & 0x3ffffc00);
             const auto e =
                 sampleLightmap(pack, std::array{irradiance}, std::array{direction}, 0, {0.5f, 0.5f}, {0, 0, 1});
             const auto [r, g, b] = decodeR11G11B10(irradiance);
-            ASSERT_EQ(e, (std::array{r / 2, g / 2, b / 2})) << r8;
+            ASSERT_EQ(e, (std::array{r / 2, g / 2, b / 2})) << r10;
         }
     }
 }
 
 TEST(SampleLightmap, FollowsTheHighlightModel) {
     const Pack pack = pageOf(1, 1);
-    // r = 51/255 = 0.2; m = (76/127, 0): d_x = m / 0.8, d_z = sqrt(1 - d_x^2).
-    const uint32_t direction = 51u | (128u + 76u) << 8 | 128u << 16;
-    const double d_x = 76.0 / 127 / 0.8, d_z = std::sqrt(1 - d_x * d_x);
+    // r = 0.2 (204.6, so 205/1023); d_x = 0.75, so b_x = (1-r) d_x / d_z = 0.907 (46.4 steps, so 46).
+    const uint32_t direction = 205u | (512u + 46u) << 10 | 512u << 20;
+    const double r = 205.0 / 1023, b_x = 46 * 5.0 / 256;
     const uint32_t irradiance = encodeR11G11B10(8, 4, 2);
     for (double degrees = -90; degrees <= 90; degrees += 5) {
         const double n_x = std::sin(degrees * M_PI / 180), n_z = std::cos(degrees * M_PI / 180);
-        const double expected = 0.2 + 0.8 * std::max(0.0, n_x * d_x + n_z * d_z) / d_z;
+        const double expected = r + std::max(0.0, n_x * b_x + (1 - r) * n_z);
         const auto e = sampleLightmap(pack, std::array{irradiance}, std::array{direction}, 0, {0.5f, 0.5f},
                                       {static_cast<float>(n_x), 0, static_cast<float>(n_z)});
         EXPECT_NEAR(e[0], 4 * expected, 1e-5);
@@ -77,13 +77,13 @@ TEST(SampleLightmap, InterpolatesBetweenTexelCentresAndClampsAtEdges) {
 TEST(SampleLightmap, ATexelWithoutDirectionPullsItsNeighbourTowardsNone) {
     const Pack pack = pageOf(2, 1);
     const uint32_t irradiance = encodeR11G11B10(2, 2, 2);
-    // r = 0, d_x = 0.6 (76.2/127, so 76), and none: halfway r = 0.5, m = 38/127.
-    const std::array direction{0u | (128u + 76u) << 8 | 128u << 16, no_direction};
-    const double r = 0.5, m = 38.0 / 127, d_x = m / 0.5, d_z = std::sqrt(1 - d_x * d_x);
+    // r = 0, b_x = 0.75 (38.4 steps, so 38), and none: halfway r = 0.5 and half of b.
+    const std::array direction{0u | (512u + 38u) << 10 | 512u << 20, no_direction};
+    const double r = 0.5, b_x = 19 * 5.0 / 256;
     const double n_x = 0.6, n_z = 0.8;
     const auto e =
         sampleLightmap(pack, std::array{irradiance, irradiance}, direction, 0, {0.5f, 0.5f}, {0.6f, 0, 0.8f});
-    EXPECT_NEAR(e[0], r + (1 - r) * (n_x * d_x + n_z * d_z) / d_z, 1e-5);
+    EXPECT_NEAR(e[0], r + n_x * b_x + (1 - r) * n_z, 1e-5);
 }
 
 TEST(SampleLightmap, AnUnknownPageIsDark) {

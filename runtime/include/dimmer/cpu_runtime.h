@@ -18,7 +18,7 @@ class CpuRuntime : public LightState {
     UpdateStats update();
 
     // The lightmap pages, one after another, rows from the top; in the sampled formats: B10G11R11_UFLOAT_PACK32 and
-    // R8G8B8A8_UNORM.
+    // A2B10G10R10_UNORM_PACK32.
     std::span<const uint32_t> irradiancePages() const { return irradiance_; }
     std::span<const uint32_t> directionPages() const { return direction_; }
 

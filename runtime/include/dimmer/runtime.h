@@ -20,7 +20,16 @@ struct VulkanContext {
     uint32_t queue_family = 0;
 };
 
+// How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
+enum class UpdateMode {
+    WorkList,        // one dispatch per number of contributions that are on
+    PerCombination,  // one dispatch per changed cluster
+    Gather,          // a list of records per texel; all texels whenever anything changed
+    Scatter,         // one pass per contribution over 32-bit sums; all texels whenever anything changed
+};
+
 struct RuntimeOptions {
+    UpdateMode mode = UpdateMode::WorkList;
     // Write GPU timestamps around each update, read by stats(). Off costs nothing.
     bool timestamps = true;
 };
@@ -29,7 +38,7 @@ struct RuntimeOptions {
 struct LightmapImages {
     VkImage irradiance = VK_NULL_HANDLE;           // B10G11R11_UFLOAT_PACK32; lux * exposure
     VkImageView irradiance_view = VK_NULL_HANDLE;  // VK_IMAGE_VIEW_TYPE_2D_ARRAY
-    VkImage direction = VK_NULL_HANDLE;            // R8G8B8A8_UNORM; see sample.glsl
+    VkImage direction = VK_NULL_HANDLE;            // A2B10G10R10_UNORM_PACK32; see sample.glsl
     VkImageView direction_view = VK_NULL_HANDLE;
     VkSampler sampler = VK_NULL_HANDLE;  // bilinear, clamp to edge
     uint32_t width = 0, height = 0, layers = 0;

@@ -21,9 +21,7 @@
 vec3 dimmer_lightmap_irradiance(sampler2DArray irradiance, sampler2DArray direction, vec3 uv_page, vec3 normal_tangent,
                                 float exposure) {
     vec3 e_z = texture(irradiance, uv_page).rgb;
-    vec3 bytes = texture(direction, uv_page).rgb;
-    vec2 m = (bytes.yz * 255.0 - 128.0) / 127.0;
-    vec3 h = dimmer_highlight_from_bytes(bytes.x, m.x, m.y);
+    vec3 h = dimmer_highlight_from_unorm(texture(direction, uv_page).rgb);
     // E(n) = E_z (r + max(0, b.n_xy + (1-r) n_z)); see runtime/format/texel.h.
     float highlight = dot(h.yz, normal_tangent.xy) + (1.0 - h.x) * normal_tangent.z;
     return e_z * ((h.x + max(highlight, 0.0)) / exposure);

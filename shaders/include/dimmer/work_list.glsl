@@ -1,5 +1,5 @@
-// The work list of an update: shared by C++ (planner, CPU executor) and GLSL (blend_texels.comp). Both structures are
-// 16 bytes with the same layout in std430 and in C++.
+// The work list of an update: shared by C++ (planner, executors) and GLSL (blend_texels.comp, which reads each
+// structure as a uvec4). The same layout in std430 and in C++.
 #ifndef DIMMER_WORK_LIST_GLSL
 #define DIMMER_WORK_LIST_GLSL
 
@@ -11,23 +11,31 @@ namespace dimmer {
 #define DIMMER_UINT uint
 #endif
 
-// A batch to blend: one workgroup, one lane per receiver.
+// A batch to blend.
 struct WorkItem {
-    DIMMER_UINT first_receiver;
-    DIMMER_UINT receiver_count;  // 1..64
-    DIMMER_UINT first_term;      // the batch's contributions that are on, ascending, in the list of terms
+    DIMMER_UINT batch;       // of the pack; the device knows it by its BatchPlace
+    DIMMER_UINT first_term;  // the cluster's contributions that are on, ascending, in the list of terms
     DIMMER_UINT term_count;
+    DIMMER_UINT cluster;
 };
 
 // A contribution of a cluster that is on.
 struct WorkTerm {
-    DIMMER_UINT payload_bias;  // index of a receiver's record = payload_bias + receiver, modulo 2^32
-    float weight_r, weight_g, weight_b;
+    DIMMER_UINT slot;                    // its place among all of the cluster's contributions
+    float weight_r, weight_g, weight_b;  // times weight_scale of texel.h
+};
+
+// Where the device keeps a batch.
+struct BatchPlace {
+    DIMMER_UINT first_receiver;
+    DIMMER_UINT receiver_count;
+    DIMMER_UINT offset;        // of the batch within its cluster, in receivers
+    DIMMER_UINT first_record;  // where, in the table of first records, those of its cluster's contributions begin
 };
 
 #undef DIMMER_UINT
 #ifdef __cplusplus
-static_assert(sizeof(WorkItem) == 16 && sizeof(WorkTerm) == 16);
+static_assert(sizeof(WorkItem) == 16 && sizeof(WorkTerm) == 16 && sizeof(BatchPlace) == 16);
 }  // namespace dimmer
 #endif
 

@@ -1,0 +1,121 @@
+#include <app/command.h>
+#include <app/terminal_progress.h>
+#include <pipeline/heat_map.h>
+#include <pipeline/verify.h>
+
+#include <fmt/format.h>
+
+#include <memory>
+
+namespace dimmer::cook {
+namespace {
+
+struct Arguments {
+    std::string level, pack, json, heatmap;
+    VerifyOptions options;
+    double max_error = -1;  // below 0: no limit
+    bool no_sets = false;
+};
+
+void printReport(const VerifyReport& r, const VerifyOptions& options) {
+    fmt::print("{:<22} {:>8} {:>8} {:>8} {:>8} {:>16}\n", "points", "mean", "p95", "RMSE", "bias", "reference error");
+    auto row = [](std::string_view name, const ErrorFigures& f) {
+        fmt::print("{:<22} {:>6.2f} % {:>6.2f} % {:>6.2f} % {:>+6.2f} % {:>14.2f} %\n",
+                   fmt::format("{} {}", f.points, name), 100 * f.mean, 100 * f.p95, 100 * f.rmse, 100 * f.bias,
+                   100 * f.reference_error_mean);
+    };
+    row("surface", r.surface);
+    row("tilted", r.tilted);
+    fmt::print("\nerror = |E - E_ref| / (E_ref + {:.4g} lux); tilted: normals within {:.0f} degrees of the surface's\n",
+               r.floor_lux, static_cast<double>(tilt_max_deg));
+    fmt::print("{:.1f} M paths: {}\n", static_cast<double>(r.paths) / 1e6,
+               r.converged ? "converged (the reference's error is at most a tenth of what is measured)"
+                           : fmt::format("not converged within {} paths per point; what the noise adds is taken off",
+                                         options.paths_max));
+    for (const auto& [name, mean] : r.causes) fmt::print("cause {:<20} {:>6.2f} %\n", name, 100 * mean);
+    if (r.sets.empty()) return;
+    fmt::print("\n{:<26} {:>8} {:>8} {:>8} {:>10} {:>14}\n", "light set, alone", "error", "bias", "points",
+               "ref. noise", "energy dropped");
+    for (const SetReport& s : r.sets)
+        fmt::print("{:<26} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name, 100 * s.effect.error,
+                   100 * s.effect.bias, s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
+}
+
+nlohmann::ordered_json toJson(const ErrorFigures& f) {
+    return {{"mean", f.mean},
+            {"p95", f.p95},
+            {"rmse", f.rmse},
+            {"bias", f.bias},
+            {"measured_mean", f.measured_mean},
+            {"reference_relative_standard_error", f.reference_error_mean},
+            {"points", f.points}};
+}
+
+nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& options) {
+    nlohmann::ordered_json j;
+    j["state"] = options.state;
+    j["converged"] = r.converged;
+    j["reference_relative_standard_error"] = r.surface.reference_error_mean;
+    j["floor_lux"] = r.floor_lux;
+    j["surface"] = toJson(r.surface);
+    j["tilted"] = toJson(r.tilted);
+    j["causes"] = r.causes;
+    j["sets"] = nlohmann::ordered_json::array();
+    for (const SetReport& s : r.sets)
+        j["sets"].push_back({{"name", s.name},
+                             {"error", s.effect.error},
+                             {"bias", s.effect.bias},
+                             {"points", s.effect.points},
+                             {"reference_noise", s.effect.reference_noise},
+                             {"energy_dropped", s.energy_dropped}});
+    return j;
+}
+
+int run(Arguments a) {
+    const auto scene = importLevel(a.level);
+    if (!scene) return reportError(scene.error());
+    const auto pack = Pack::open(a.pack);
+    if (!pack) return reportError(pack.error());
+    TerminalProgress progress;
+    a.options.sets = !a.no_sets;
+    const auto report = verify(*scene, *pack, a.options, progress);
+    if (!report) return reportError(report.error());
+    if (!a.heatmap.empty())
+        if (auto ok = writeHeatMaps(a.heatmap, *pack, *report, a.options.state); !ok) return reportError(ok.error());
+    if (!a.json.empty())
+        if (auto ok = writeJson(toJson(*report, a.options), a.json); !ok) return reportError(ok.error());
+    if (a.json != "-") printReport(*report, a.options);
+    if (a.max_error < 0 || report->surface.mean <= a.max_error) return exit_done;
+    fmt::print(stderr, "dimmer: the mean error, {:.4f}, is above {}\n", report->surface.mean, a.max_error);
+    return exit_above_max_error;
+}
+
+}  // namespace
+
+void addVerifyCommand(CLI::App& app, int& exit_code) {
+    auto a = std::make_shared<Arguments>();
+    auto* c = app.add_subcommand("verify", "A pack's error against the reference path tracer");
+    c->add_option("LEVEL", a->level, "the level that the pack was cooked from")->required();
+    c->add_option("PACK", a->pack, "a cooked pack")->required();
+    c->add_option("--state", a->options.state,
+                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1, doors 0; a door "
+                  "is 0 or 1");
+    c->add_option("--points", a->options.points, "random places on lightmapped surfaces")
+        ->check(CLI::Range(1u, 1000000u))
+        ->capture_default_str();
+    c->add_option("--paths", a->options.paths_max, "paths per point at most; fewer where they do")
+        ->check(CLI::Range(2u, 1u << 24))
+        ->capture_default_str();
+    c->add_option("--seed", a->options.seed, "of points and paths")->capture_default_str();
+    c->add_flag("--no-sets", a->no_sets, "leave out what each light set does alone");
+    c->add_option("--max-error", a->max_error,
+                  "exit with 4 when the mean error at surfaces is above, e.g. 0.1 for 10 %")
+        ->check(CLI::NonNegativeNumber);
+    c->add_option("--heatmap", a->heatmap,
+                  "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
+    c->add_option("--json", a->json, "write the report there; - for stdout");
+    c->footer("Example: dimmer verify house.gltf house.dimmer --state \"alarm=0\" --max-error 0.1 --heatmap error");
+    c->callback([a, &exit_code] { exit_code = run(*a); });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,81 @@
+#include <pipeline/heat_map.h>
+
+#include <dimmer/cpu_runtime.h>
+#include <format/texel.h>
+
+#include <fmt/format.h>
+
+// stb's own code is outside our warnings.
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#pragma GCC diagnostic ignored "-Wunused-function"
+#define STB_IMAGE_WRITE_STATIC
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#include <stb_image_write.h>
+#pragma GCC diagnostic pop
+
+#include <algorithm>
+#include <cmath>
+#include <system_error>
+
+namespace dimmer::cook {
+namespace {
+
+// Grey, so that the discs stand out: darker than half, six powers of ten deep.
+uint8_t grey(double luminance_lux) {
+    const double decades = std::log10(std::max(luminance_lux, 1e-3)) + 3;
+    return static_cast<uint8_t>(std::clamp(decades * 20, 0.0, 120.0));
+}
+
+std::array<uint8_t, 3> heat(double signed_error) {
+    const double t = std::clamp(signed_error / heat_full_error, -1.0, 1.0);
+    const auto faded = static_cast<uint8_t>(255 * (1 - std::abs(t)));
+    return t < 0 ? std::array<uint8_t, 3>{faded, faded, 255} : std::array<uint8_t, 3>{255, faded, faded};
+}
+
+struct Picture {
+    int width, height;
+    std::vector<uint8_t> rgb;
+
+    void disc(double x, double y, int radius, std::array<uint8_t, 3> colour) {
+        const int cx = static_cast<int>(x), cy = static_cast<int>(y);
+        for (int j = std::max(0, cy - radius); j <= std::min(height - 1, cy + radius); ++j)
+            for (int i = std::max(0, cx - radius); i <= std::min(width - 1, cx + radius); ++i)
+                if ((i - cx) * (i - cx) + (j - cy) * (j - cy) <= radius * radius)
+                    std::ranges::copy(colour, rgb.begin() + (std::ptrdiff_t{j} * width + i) * 3);
+    }
+};
+
+}  // namespace
+
+Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pack, const VerifyReport& report,
+                             std::string_view state) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (error) return fail(ErrorCode::Io, fmt::format("{}: {}", folder.string(), error.message()));
+    CpuRuntime runtime(pack);
+    if (auto ok = runtime.apply(state); !ok) return ok;
+    runtime.update();
+    const size_t texels = size_t{pack.pageWidth()} * pack.pageHeight();
+    for (uint32_t page = 0; page < pack.pageCount(); ++page) {
+        Picture picture{static_cast<int>(pack.pageWidth()), static_cast<int>(pack.pageHeight()), {}};
+        for (uint32_t texel : runtime.irradiancePages().subspan(page * texels, texels)) {
+            const auto [r, g, b] = decodeR11G11B10(texel);
+            picture.rgb.insert(picture.rgb.end(), 3, grey(static_cast<double>(luminance(r, g, b) / pack.exposure())));
+        }
+        const int radius = std::max(1, picture.width / 256);
+        for (size_t i = 0; i < report.points.size(); ++i) {
+            if (pack.meshes()[report.points[i].mesh].page != page) continue;
+            const LightPair& p = report.surface_pairs[i];
+            picture.disc(static_cast<double>(report.points[i].uv[0]) * picture.width,
+                         static_cast<double>(report.points[i].uv[1]) * picture.height, radius,
+                         heat((p.value_lux - p.reference_lux) / (p.reference_lux + report.floor_lux)));
+        }
+        const auto file = folder / fmt::format("page_{}.png", page);
+        if (!stbi_write_png(file.c_str(), picture.width, picture.height, 3, picture.rgb.data(), picture.width * 3))
+            return fail(ErrorCode::Io, fmt::format("{}: the picture could not be written", file.string()));
+    }
+    return {};
+}
+
+}  // namespace dimmer::cook

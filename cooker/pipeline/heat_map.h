@@ -1,0 +1,18 @@
+// The error that verify measured, as pictures of the lightmap's pages.
+#pragma once
+
+#include <pipeline/verify.h>
+
+#include <filesystem>
+
+namespace dimmer::cook {
+
+// Errors at and above this are drawn in the hottest colour; beyond, 25 % is 25 %.
+inline constexpr double heat_full_error = 0.5;
+
+// Writes page_0.png, page_1.png, ... into `folder` (created when missing): the pages' luminance in grey, and a disc in
+// false colour per point: blue too dark, white exact, red too bright.
+Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pack, const VerifyReport& report,
+                             std::string_view state);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,87 @@
+#include <pipeline/reference_state.h>
+
+#include <bake/sampling.h>
+#include <update/state_text.h>
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+namespace {
+
+template <class Named>
+Expected<size_t> indexOf(const std::vector<Named>& list, std::string_view name, std::string_view what) {
+    const auto it = std::ranges::find(list, name, &Named::name);
+    if (it != list.end()) return static_cast<size_t>(it - list.begin());
+    std::vector<std::string_view> names;
+    for (const Named& entry : list) names.push_back(entry.name);
+    const std::string_view near = nearestName(name, names);
+    return fail(ErrorCode::NotFound, fmt::format("The level has no {} \"{}\"{}", what, name,
+                                                 near.empty() ? "." : fmt::format("; did you mean \"{}\"?", near)));
+}
+
+Expected<void> setDoor(const Scene& scene, const StateAssignment& item, ReferenceState& state) {
+    const auto door = indexOf(scene.doors, item.name, "door");
+    if (!door) return std::unexpected(door.error());
+    if (item.value.r != 0 && item.value.r != 1)
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("Door \"{}\" is {} open; the reference takes 0 or 1.", item.name, item.value.r));
+    if (item.value.r == 1 && scene.doors[*door].pose)
+        return fail(ErrorCode::Unsupported,
+                    fmt::format("Door \"{}\" opens by a pose, which the reference does not trace yet.", item.name));
+    state.door_open[*door] = item.value.r == 1;
+    return {};
+}
+
+bool enough(const ReferenceEstimate& estimate, const ReferenceTarget& target) {
+    if (estimate.paths() < target.paths_min) return false;
+    if (estimate.paths() >= target.paths_max) return true;
+    const ReferenceValue v = estimate.value();
+    return static_cast<double>(v.luminance_error_lux) <=
+           target.relative * (static_cast<double>(luminance(v.irradiance_lux)) + target.floor_lux);
+}
+
+}  // namespace
+
+Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view text) {
+    const auto assignments = parseState(text);
+    if (!assignments) return std::unexpected(assignments.error());
+    using Target = StateAssignment::Target;
+    ReferenceState state{std::vector<glm::vec3>(scene.light_sets.size(), glm::vec3(1)),
+                         std::vector<bool>(scene.doors.size())};
+    for (const StateAssignment& item : *assignments)
+        if (item.target == Target::AllSets)
+            std::ranges::fill(state.set_weights, glm::vec3(item.value.r, item.value.g, item.value.b));
+    for (const StateAssignment& item : *assignments) {
+        if (item.target == Target::Door)
+            if (auto ok = setDoor(scene, item, state); !ok) return std::unexpected(ok.error());
+        if (item.target != Target::Set) continue;
+        const auto set = indexOf(scene.light_sets, item.name, "light set");
+        if (!set) return std::unexpected(set.error());
+        state.set_weights[*set] = {item.value.r, item.value.g, item.value.b};
+    }
+    return state;
+}
+
+Scene sceneInState(Scene scene, const ReferenceState& state) {
+    std::erase_if(scene.meshes, [&](const SceneMesh& mesh) { return mesh.door && state.door_open[*mesh.door]; });
+    return scene;
+}
+
+void refineAll(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, const ReferenceTarget& target,
+               std::span<ReferenceEstimate> estimates, Progress& progress) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), 1), [&](const auto& range) {
+        for (size_t i = range.begin(); i < range.end(); ++i)
+            while (!enough(estimates[i], target)) {
+                const uint32_t so_far = estimates[i].paths();
+                const uint32_t more = std::max(target.paths_min > so_far ? target.paths_min - so_far : 0, so_far / 2);
+                tracer.refine(estimates[i], points[i],
+                              std::min(std::max(more, 1u), std::max(target.paths_max, target.paths_min) - so_far));
+            }
+        progress.advance(range.size());
+    });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,326 @@
+#include <pipeline/verify.h>
+
+#include <bake/sampling.h>
+#include <dimmer/cpu_runtime.h>
+#include <format/texel.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace dimmer::cook {
+namespace {
+
+// The reference's standard error over the error that is measured; see converged.
+constexpr double converged_share = 0.1;
+// First look at a point, good enough to say how large the error is and so how many paths it takes.
+constexpr double first_relative = 0.02;
+constexpr uint32_t hidden_rays = 16;
+constexpr uint32_t tries_per_point = 20;
+// A set's light at a point is known well enough at this share of the light there and of the set's typical light.
+constexpr double set_relative = 0.04;
+constexpr uint32_t set_paths_first = 256, set_paths_max = 4096;
+// One set lights a part of the level: it takes more places to find it, most of which cost the first look alone.
+constexpr uint32_t set_points_factor = 4;
+
+glm::vec3 vec(const std::array<float, 3>& a) {
+    return {a[0], a[1], a[2]};
+}
+
+struct PackTriangle {
+    uint32_t mesh;
+    std::array<uint32_t, 3> corner;
+    double cumulative_m2;
+};
+
+std::vector<PackTriangle> litTriangles(const Pack& pack, const std::vector<bool>& door_open) {
+    // Elements hold the light sets first, then the doors in the scene's order.
+    const auto sets = static_cast<size_t>(
+        std::ranges::count(pack.elements(), ElementKind::LightSet, [](const Element& e) { return e.kind; }));
+    std::vector<PackTriangle> out;
+    double sum = 0;
+    for (uint32_t m = 0; m < pack.meshes().size(); ++m) {
+        const Mesh& mesh = pack.meshes()[m];
+        if (mesh.door && door_open[*mesh.door - sets]) continue;
+        for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+            const std::array corner{mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]};
+            const glm::vec3 a = vec(mesh.vertices[corner[0]].position_m);
+            const glm::vec3 b = vec(mesh.vertices[corner[1]].position_m), c = vec(mesh.vertices[corner[2]].position_m);
+            sum += 0.5 * static_cast<double>(glm::length(glm::cross(b - a, c - a)));
+            out.push_back({m, corner, sum});
+        }
+    }
+    return out;
+}
+
+VerifyPoint pointOn(const Pack& pack, const PackTriangle& t, glm::vec2 u) {
+    const Mesh& mesh = pack.meshes()[t.mesh];
+    const float root = std::sqrt(u.x);
+    const std::array weights{1 - root, root * (1 - u.y), root * u.y};
+    std::array<glm::vec3, 3> positions;
+    std::array<glm::vec2, 3> uv_texels;
+    VerifyPoint p;
+    p.mesh = t.mesh;
+    for (size_t i = 0; i < 3; ++i) {
+        const MeshVertex& v = mesh.vertices[t.corner[i]];
+        positions[i] = vec(v.position_m);
+        uv_texels[i] = glm::vec2(v.lightmap_uv[0], v.lightmap_uv[1]) * glm::vec2(pack.pageWidth(), pack.pageHeight());
+        p.position_m += weights[i] * positions[i];
+        p.uv[0] += weights[i] * v.lightmap_uv[0];
+        p.uv[1] += weights[i] * v.lightmap_uv[1];
+    }
+    const glm::vec3 normal = glm::normalize(glm::cross(positions[1] - positions[0], positions[2] - positions[0]));
+    float texel_area_m2 = 0;
+    p.frame = tangentFrame(positions, uv_texels, normal, texel_area_m2);
+    return p;
+}
+
+glm::vec3 fromTangent(const TangentFrame& f, glm::vec3 d) {
+    return f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
+}
+
+// Inside something closed: a good part of what the point sees are backs. Half would do in the middle of it, but where a
+// wall meets a floor inside, half of the rays end on the floor's front.
+bool hidden(const RayScene& rays, const VerifyPoint& p, uint32_t seed) {
+    uint32_t backs = 0;
+    for (uint32_t i = 0; i < hidden_rays; ++i) {
+        const glm::vec3 direction = fromTangent(p.frame, cosineDirection(sequence2d(i, seed)));
+        const auto hit = rays.nearest(p.position_m + 1e-3f * p.frame.normal, direction, 1e30f, seed + i);
+        if (!hit || !hit->back) continue;
+        backs += !rays.scene().materials[rays.triangles()[hit->triangle].material].double_sided;
+    }
+    return 4 * backs > hidden_rays;
+}
+
+// Uniform over the cap around +Z.
+glm::vec3 tiltedNormal(glm::vec2 u) {
+    const float cos_max = std::cos(tilt_max_deg * pi / 180);
+    const float z = 1 - u.x * (1 - cos_max), radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
+    return {radius * std::cos(phi), radius * std::sin(phi), z};
+}
+
+std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool tilted) {
+    std::vector<ReferencePoint> out;
+    for (const VerifyPoint& p : points) out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal});
+    return out;
+}
+
+std::vector<LightPair> pairsOf(std::span<const double> values, std::span<const ReferenceEstimate> estimates) {
+    std::vector<LightPair> out;
+    for (size_t i = 0; i < values.size(); ++i) {
+        const ReferenceValue v = estimates[i].value();
+        out.push_back(
+            {values[i], static_cast<double>(luminance(v.irradiance_lux)), static_cast<double>(v.luminance_error_lux)});
+    }
+    return out;
+}
+
+// One kind of normal: paths until the reference is a tenth of what is measured, or the limit.
+struct Measured {
+    std::vector<ReferenceEstimate> estimates;
+    std::vector<LightPair> pairs;
+    ErrorFigures figures;
+};
+
+Measured measure(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, std::span<const double> values,
+                 double floor_lux, uint32_t paths_max, Progress& progress) {
+    Measured m{std::vector<ReferenceEstimate>(points.size()), {}, {}};
+    ReferenceTarget target{.paths_max = paths_max, .relative = first_relative, .floor_lux = floor_lux};
+    target.paths_min = std::min(target.paths_min, paths_max);
+    for (int round = 0; round < 2; ++round) {
+        refineAll(tracer, points, target, m.estimates, progress);
+        m.pairs = pairsOf(values, m.estimates);
+        m.figures = lightError(m.pairs, floor_lux);
+        target.relative = converged_share * m.figures.measured_mean;
+    }
+    return m;
+}
+
+bool reached(const ErrorFigures& f) {
+    return f.reference_error_mean <= converged_share * f.measured_mean;
+}
+
+// What rounding to the nearest of the colour format's steps costs on average, by arithmetic: a quarter of a step.
+// Channels are rounded on their own; in luminance their errors partly cancel, which this does not count on.
+double formatError(std::span<const LightPair> pairs, double exposure, double floor_lux) {
+    double sum = 0;
+    for (const LightPair& p : pairs) {
+        const double stored = std::max(p.value_lux * exposure, 0x1p-14);
+        const double step = std::exp2(std::floor(std::log2(stored)) - 6);  // six bits of mantissa
+        sum += 0.25 * step / exposure / (p.reference_lux + floor_lux);
+    }
+    return pairs.empty() ? 0 : sum / static_cast<double>(pairs.size());
+}
+
+// The directional model alone: the pack's shape of E(n) / E_z on the reference's own E_z, against the reference.
+double modelError(const Measured& surface, const Measured& tilted, double floor_lux) {
+    std::vector<LightPair> pairs;
+    for (size_t i = 0; i < surface.pairs.size(); ++i) {
+        const LightPair &own = surface.pairs[i], &other = tilted.pairs[i];
+        if (!(own.value_lux > 0)) continue;
+        const double shape = other.value_lux / own.value_lux;
+        pairs.push_back({shape * own.reference_lux, other.reference_lux,
+                         std::hypot(shape * own.reference_error_lux, other.reference_error_lux)});
+    }
+    return lightError(pairs, floor_lux).mean;
+}
+
+// Drops the points that stay black with every set on, by the reference and by the pack alike (outsides of walls: exact
+// by having nothing, they would thin out every mean). Returns the floor that goes with the points that stay.
+Expected<double> keepLit(const RayScene& rays, const Pack& pack, uint32_t seed, std::vector<VerifyPoint>& points,
+                         Progress& progress) {
+    // The mean over all points has little noise even with few paths each.
+    std::vector<ReferenceEstimate> all_on(points.size());
+    refineAll(ReferenceTracer(rays, {.seed = seed, .set_weights = {}}), queries(points, false),
+              {.paths_min = 64, .paths_max = 64}, all_on, progress);
+    const auto packed = packLight(pack, points, false, "");
+    if (!packed) return std::unexpected(packed.error());
+    std::vector<VerifyPoint> lit;
+    double sum = 0;
+    for (size_t i = 0; i < points.size(); ++i) {
+        const auto lux = static_cast<double>(luminance(all_on[i].value().irradiance_lux));
+        sum += lux;
+        if (lux > 0 || (*packed)[i] > 0) lit.push_back(points[i]);
+    }
+    points = std::move(lit);
+    if (sum > 0) return floor_share * sum / static_cast<double>(points.size());
+    return fail(ErrorCode::BadInput,
+                "With all light sets on, the level is black: there is nothing to measure an error against.");
+}
+
+Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
+    const bool same =
+        pack.elements().size() == scene.light_sets.size() + scene.doors.size() &&
+        std::ranges::equal(scene.light_sets, pack.elements().first(scene.light_sets.size()), {}, &SceneLightSet::name,
+                           &Element::name) &&
+        std::ranges::equal(scene.doors, pack.elements().last(scene.doors.size()), {}, &SceneDoor::name, &Element::name);
+    if (same) return {};
+    return fail(ErrorCode::BadInput, fmt::format("{}: the pack has other light sets or doors than this level; cook the "
+                                                 "level again.",
+                                                 scene.file));
+}
+
+Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress,
+                          VerifyReport& report) {
+    // Each set is one that shines alone with every door closed: what the pack stores for it.
+    const RayScene closed(scene);
+    const auto points = choosePoints(pack, closed, std::vector<bool>(scene.doors.size()),
+                                     set_points_factor * options.points, options.seed + 1);
+    progress.stage("light sets", scene.light_sets.size() * 2 * points.size());
+    for (uint32_t s = 0; s < scene.light_sets.size(); ++s) {
+        const auto effect = setEffect(closed, pack, points, s, options.seed, progress);
+        if (!effect) return std::unexpected(effect.error());
+        SetReport set{scene.light_sets[s].name, *effect, 0};
+        for (const Contribution& c : pack.contributions())
+            if (c.light_set == s) set.energy_dropped = static_cast<double>(c.energy_dropped);
+        report.sets.push_back(set);
+    }
+    return {};
+}
+
+}  // namespace
+
+std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, const std::vector<bool>& door_open,
+                                      uint32_t count, uint32_t seed) {
+    const auto triangles = litTriangles(pack, door_open);
+    std::vector<VerifyPoint> points;
+    if (triangles.empty() || !(triangles.back().cumulative_m2 > 0)) return points;
+    for (uint32_t i = 0; points.size() < count && i < tries_per_point * count; ++i) {
+        // Stratified over the area; retries for hidden places start another round over it.
+        const float stratum = static_cast<float>(i % count) + unitFloat(hash(seed, 4 * i));
+        const double target = static_cast<double>(stratum) / count * triangles.back().cumulative_m2;
+        auto t = std::ranges::upper_bound(triangles, target, {}, &PackTriangle::cumulative_m2);
+        if (t == triangles.end()) --t;
+        VerifyPoint p = pointOn(pack, *t, {unitFloat(hash(seed, 4 * i + 1)), unitFloat(hash(seed, 4 * i + 2))});
+        if (hidden(rays, p, hash(seed, 4 * i + 3))) continue;
+        p.tilted = fromTangent(p.frame, tiltedNormal(sequence2d(i, hash(seed, 0x7117u))));
+        points.push_back(p);
+    }
+    return points;
+}
+
+Expected<std::vector<double>> packLight(const Pack& pack, std::span<const VerifyPoint> points, bool tilted,
+                                        std::string_view text) {
+    CpuRuntime runtime(pack);
+    if (auto ok = runtime.apply(text); !ok) return std::unexpected(ok.error());
+    runtime.update();
+    std::vector<double> out;
+    for (const VerifyPoint& p : points) {
+        const glm::vec3 n = tilted
+                                ? glm::vec3(glm::dot(p.tilted, p.frame.tangent), glm::dot(p.tilted, p.frame.bitangent),
+                                            glm::dot(p.tilted, p.frame.normal))
+                                : glm::vec3(0, 0, 1);
+        const auto e = sampleLightmap(pack, runtime.irradiancePages(), runtime.directionPages(),
+                                      pack.meshes()[p.mesh].page, p.uv, {n.x, n.y, n.z});
+        out.push_back(static_cast<double>(luminance(glm::vec3(e[0], e[1], e[2]))));
+    }
+    return out;
+}
+
+Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::span<const VerifyPoint> points,
+                                  uint32_t set, uint32_t seed, Progress& progress) {
+    const std::string name = pack.elements()[set].name;
+    auto with = packLight(pack, points, false, fmt::format("all=0,{}=1", name));
+    if (!with) return std::unexpected(with.error());
+    auto without = packLight(pack, points, false, "all=0");
+    if (!without) return std::unexpected(without.error());
+    std::ranges::transform(*with, *without, with->begin(), std::minus{});
+
+    const ReferenceTracer tracer(rays, onlySet(set, rays.scene().light_sets.size(), seed));
+    const auto where = queries(points, false);
+    std::vector<ReferenceEstimate> estimates(points.size());
+    refineAll(tracer, where, {.paths_min = set_paths_first, .paths_max = set_paths_first}, estimates, progress);
+    // How bright it is where the set shines: the mean weighted by the light itself.
+    double sum = 0, squares = 0;
+    for (const LightPair& p : pairsOf(*with, estimates)) {
+        sum += p.reference_lux;
+        squares += p.reference_lux * p.reference_lux;
+    }
+    const double typical_lux = sum > 0 ? squares / sum : 0;
+    refineAll(
+        tracer, where,
+        {.paths_min = set_paths_first, .paths_max = set_paths_max, .relative = set_relative, .floor_lux = typical_lux},
+        estimates, progress);
+    return effectError(pairsOf(*with, estimates));
+}
+
+Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress) {
+    if (auto ok = checkSameLevel(scene, pack); !ok) return std::unexpected(ok.error());
+    const auto state = readReferenceState(scene, options.state);
+    if (!state) return std::unexpected(state.error());
+    const Scene as_it_stands = sceneInState(scene, *state);
+    const RayScene rays(as_it_stands);
+    VerifyReport report;
+    report.points = choosePoints(pack, rays, state->door_open, options.points, options.seed);
+    if (report.points.empty()) return fail(ErrorCode::BadInput, "The pack has no lightmapped surface in sight.");
+
+    progress.stage("reference", 5 * report.points.size());
+    const auto floor_lux = keepLit(rays, pack, options.seed, report.points, progress);
+    if (!floor_lux) return std::unexpected(floor_lux.error());
+    const auto own_queries = queries(report.points, false), tilted_queries = queries(report.points, true);
+    report.floor_lux = *floor_lux;
+    const auto own = packLight(pack, report.points, false, options.state);
+    if (!own) return std::unexpected(own.error());
+    const auto tilted = packLight(pack, report.points, true, options.state);
+    if (!tilted) return std::unexpected(tilted.error());
+
+    const ReferenceTracer tracer(rays, state->options(options.seed));
+    const Measured at_surface = measure(tracer, own_queries, *own, *floor_lux, options.paths_max, progress);
+    const Measured at_tilted = measure(tracer, tilted_queries, *tilted, *floor_lux, options.paths_max, progress);
+    report.surface = at_surface.figures;
+    report.tilted = at_tilted.figures;
+    report.surface_pairs = at_surface.pairs;
+    report.converged = reached(report.surface) && reached(report.tilted);
+    for (const Measured* m : {&at_surface, &at_tilted})
+        for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
+    report.causes["colour_format"] = formatError(at_surface.pairs, static_cast<double>(pack.exposure()), *floor_lux);
+    report.causes["directional_model"] = modelError(at_surface, at_tilted, *floor_lux);
+    if (options.sets)
+        if (auto ok = verifySets(scene, pack, options, progress, report); !ok) return std::unexpected(ok.error());
+    progress.finish();
+    return report;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,69 @@
+// A pack against the reference path tracer: how large the error is, and where it comes from.
+#pragma once
+
+#include <bake/progress.h>
+#include <dimmer/pack.h>
+#include <pipeline/light_error.h>
+#include <pipeline/reference_state.h>
+#include <trace/nearest_surface.h>
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+// A random place on a lightmapped surface, and a random normal within tilt_max_deg of the surface's own.
+struct VerifyPoint {
+    uint32_t mesh = 0;  // into Pack::meshes()
+    std::array<float, 2> uv{};
+    glm::vec3 position_m{0};
+    TangentFrame frame;
+    glm::vec3 tilted{0, 0, 1};
+};
+inline constexpr float tilt_max_deg = 60;
+
+// Area-weighted, over all lightmapped surfaces but leaves of open doors. Places that nobody can see are left out: those
+// inside closed geometry, from where many rays meet backs. The same seed gives the same points.
+std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, const std::vector<bool>& door_open,
+                                      uint32_t count, uint32_t seed);
+
+// Luminance in lux at every point, own or tilted normal, in the pack's state `text`.
+Expected<std::vector<double>> packLight(const Pack& pack, std::span<const VerifyPoint> points, bool tilted,
+                                        std::string_view text);
+
+struct VerifyOptions {
+    std::string state;
+    uint32_t points = 500;
+    uint32_t paths_max = 16384;  // per point
+    uint32_t seed = 1;
+    bool sets = true;  // also what each light set does
+};
+
+struct SetReport {
+    std::string name;
+    EffectFigures effect;
+    double energy_dropped = 0;  // share that fell below the activity threshold, as the pack states it
+};
+
+struct VerifyReport {
+    ErrorFigures surface, tilted;
+    // The reference's standard error is at most a tenth of the measured error.
+    bool converged = false;
+    std::map<std::string, double> causes;  // mean error by cause, where it can be told apart
+    std::vector<SetReport> sets;
+    std::vector<VerifyPoint> points;
+    std::vector<LightPair> surface_pairs;  // per point
+    double floor_lux = 0;
+    uint64_t paths = 0;
+};
+
+// `scene` is the level that `pack` was cooked from.
+Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress);
+
+// What one light set adds, alone, at candidates all over the level (paths go where its light goes).
+Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::span<const VerifyPoint> points,
+                                  uint32_t set, uint32_t seed, Progress& progress);
+
+}  // namespace dimmer::cook

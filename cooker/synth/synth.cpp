@@ -1,0 +1,177 @@
+#include <synth/synth.h>
+
+#include <synth/regions.h>
+
+#include <fmt/format.h>
+#include <format/texel.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr std::array<LevelStatistics, 5> levels = {{
+    {"estate", 2637824, 50805, 229725, 132, 0, 28, 77},
+    {"consulate", 3276800, 32783, 229250, 61, 0, 32, 61},
+    {"townhoused", 4194304, 16524, 151408, 24, 1, 37, 50},
+    {"safehouse", 2363392, 77110, 232617, 14, 3, 27, 41},
+    {"yard", 2097152, 32183, 135209, 6, 0, 12, 27},
+}};
+
+constexpr uint32_t page_width = 2048, page_height_max = 2048;
+constexpr uint32_t overlap_max = 16;  // UBERBAKE's own limit
+
+// 0.01 to 100 lux per contribution in a level whose largest sum is near 1,600: the format's range is in use, and the
+// largest sum (16 contributions and the base) stays below 65024.
+constexpr float exposure = 32;
+
+float uniform(SynthRandom& random, float low, float high) {
+    return low + (high - low) * (static_cast<float>(random() >> 8) * 0x1p-24f);
+}
+
+TexelRecord randomRecord(SynthRandom& random) {
+    const float stored = std::exp2(uniform(random, -6.6f, 6.6f)) * exposure;
+    const float r = uniform(random, 0.2f, 1), z = uniform(random, 0.3f, 1), angle = uniform(random, 0, 6.2831853f);
+    const float across = std::sqrt(1 - z * z) / z * (1 - r);
+    return {encodeR11G11B10(stored, stored * uniform(random, 0.6f, 1), stored * uniform(random, 0.3f, 1)),
+            encodeDirection(1, r, across * std::cos(angle), across * std::sin(angle))};
+}
+
+void addPages(const SynthOptions& options, PackData& pack) {
+    const auto texels = static_cast<uint32_t>(std::llround(options.level.texels * options.scale));
+    const uint32_t rows = (texels + page_width - 1) / page_width;
+    pack.page_width = page_width;
+    pack.page_count = (rows + page_height_max - 1) / page_height_max;
+    pack.page_height = (rows + pack.page_count - 1) / pack.page_count;
+    pack.exposure = exposure;
+}
+
+void addElements(const SynthOptions& options, PackData& pack) {
+    const uint32_t sets = options.light_sets ? options.light_sets : options.level.light_sets;
+    for (uint32_t i = 0; i < sets; ++i) {
+        pack.elements.push_back({fmt::format("set{}", i), ElementKind::LightSet, 1});
+        pack.contributions.push_back({i, {}, {}, 0, 0});
+    }
+    for (uint32_t i = 0; i < options.level.doors; ++i) {
+        pack.elements.push_back({fmt::format("door{}", i), ElementKind::Door, 1});
+        pack.contributions.push_back({std::nullopt, {sets + i}, {}, 0, 0});
+    }
+}
+
+// The receivers of each region, along the 8x8 tiles of the pages, as the cooker orders them.
+std::vector<std::vector<uint32_t>> addressesOf(const Regions& regions, const PackData& pack) {
+    std::vector<std::vector<uint32_t>> result(regions.count());
+    for (uint32_t page = 0; page < pack.page_count; ++page)
+        for (uint32_t ty = 0; ty < pack.page_height; ty += 8)
+            for (uint32_t tx = 0; tx < pack.page_width; tx += 8)
+                for (uint32_t i = 0; i < 64; ++i) {
+                    const uint32_t x = tx + i % 8, y = ty + i / 8;
+                    if (y < pack.page_height)
+                        result[regions.at(x, page * pack.page_height + y)].push_back(TexelAddress::pack(page, x, y));
+                }
+    return result;
+}
+
+void addCluster(const std::vector<uint32_t>& contributions, std::span<const uint32_t> addresses, PackData& pack) {
+    const auto count = static_cast<uint32_t>(addresses.size());
+    Cluster cluster{.first_receiver = static_cast<uint32_t>(pack.addresses.size()),
+                    .receiver_count = count,
+                    .first_batch = static_cast<uint32_t>(pack.batches.size()),
+                    .batch_count = (count + batch_receivers_max - 1) / batch_receivers_max,
+                    .first_term = static_cast<uint32_t>(pack.terms.size()),
+                    .term_count = static_cast<uint32_t>(contributions.size())};
+    for (uint32_t first = 0; first < count; first += batch_receivers_max)
+        pack.batches.push_back({cluster.first_receiver + first, std::min(batch_receivers_max, count - first)});
+    for (uint32_t k : contributions) {
+        pack.terms.push_back({k, pack.contributions[k].receivers});  // within the contribution, for now
+        pack.contributions[k].receivers += count;
+    }
+    pack.addresses.insert(pack.addresses.end(), addresses.begin(), addresses.end());
+    pack.clusters.push_back(cluster);
+}
+
+// Clusters by their number of contributions, as the cooker orders them.
+std::vector<uint32_t> byOverlap(const std::vector<std::vector<uint32_t>>& members) {
+    std::vector<uint32_t> order(members.size());
+    std::iota(order.begin(), order.end(), 0u);
+    std::ranges::stable_sort(order, {}, [&](uint32_t i) { return members[i].size(); });
+    return order;
+}
+
+void addRecords(SynthRandom& random, PackData& pack) {
+    std::vector<uint32_t> first(1, 0);
+    for (const Contribution& c : pack.contributions) first.push_back(first.back() + c.receivers);
+    for (ClusterTerm& term : pack.terms) term.first_record += first[term.contribution];
+    pack.payload.resize(first.back());
+    for (TexelRecord& record : pack.payload) record = randomRecord(random);
+    pack.base_pages.resize(size_t{pack.page_count} * pack.page_height * pack.page_width);
+    for (TexelRecord& record : pack.base_pages) record = randomRecord(random);
+}
+
+std::string settingsOf(const SynthOptions& options) {
+    const auto entry = [](const auto& value) {
+        return nlohmann::ordered_json{{"value", value}, {"from", "command line"}};
+    };
+    return nlohmann::ordered_json{{"synth.like", entry(std::string(options.level.name))},
+                                  {"synth.scale", entry(options.scale)},
+                                  {"synth.clusters", entry(options.clusters)},
+                                  {"synth.sets", entry(options.light_sets)},
+                                  {"synth.seed", entry(options.seed)}}
+        .dump();
+}
+
+Expected<void> check(const SynthOptions& options) {
+    if (!(options.scale >= 1.0 / 64 && options.scale <= 64))
+        return fail(ErrorCode::InvalidArgument, fmt::format("The scale {} is not within 1/64..64.", options.scale));
+    if (options.clusters == 0 || options.clusters > 100000)
+        return fail(ErrorCode::InvalidArgument, fmt::format("{} clusters are not within 1..100000.", options.clusters));
+    if (options.light_sets > 4096)
+        return fail(ErrorCode::InvalidArgument, fmt::format("{} light sets are more than 4096.", options.light_sets));
+    return {};
+}
+
+}  // namespace
+
+double LevelStatistics::meanOverlap() const {
+    const double record_bytes = 8.0 * texels + 28.0 * (local_probes + global_probes);
+    return (memory_with_sets_mib - memory_mib) * 0x1p20 / record_bytes;
+}
+
+std::span<const LevelStatistics> productionLevels() {
+    return levels;
+}
+
+std::optional<LevelStatistics> productionLevel(std::string_view name) {
+    const auto found = std::ranges::find(levels, name, &LevelStatistics::name);
+    return found == levels.end() ? std::nullopt : std::optional(*found);
+}
+
+Expected<PackData> synthesise(const SynthOptions& options) {
+    if (auto ok = check(options); !ok) return std::unexpected(ok.error());
+    PackData pack;
+    addPages(options, pack);
+    addElements(options, pack);
+
+    SynthRandom random(options.seed);
+    const double mean = options.level.meanOverlap();
+    const auto contributions = static_cast<uint32_t>(pack.contributions.size());
+    // A share 1 / (1 + mean) of geometrically distributed overlaps is 0: those regions come on top.
+    const auto region_count = static_cast<uint32_t>(std::ceil(options.clusters * (1 + mean) / mean));
+    const Regions regions(page_width, pack.page_count * pack.page_height, region_count, random);
+    const auto addresses = addressesOf(regions, pack);
+    std::vector<uint32_t> sizes;
+    for (const auto& list : addresses) sizes.push_back(static_cast<uint32_t>(list.size()));
+    const auto overlaps = fitOverlaps(sizes, mean, options.clusters, std::min(overlap_max, contributions), random);
+    const auto members = nearestContributions(regions, overlaps, contributions, random);
+    for (uint32_t i : byOverlap(members))
+        if (!members[i].empty() && !addresses[i].empty()) addCluster(members[i], addresses[i], pack);
+    addRecords(random, pack);
+    pack.settings_json = settingsOf(options);
+    return pack;
+}
+
+}  // namespace dimmer::cook

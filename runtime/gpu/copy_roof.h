@@ -1,0 +1,45 @@
+// How fast a device's compute kernels can move bytes: what the update's speed is held against.
+#pragma once
+
+#include <gpu/kernel.h>
+#include <gpu/transfer.h>
+#include <gpu/update_timer.h>
+
+#include <optional>
+
+namespace dimmer {
+
+// What a copy stores into: a buffer, as fast as the device can, or page images, four bytes at a time, as an update has
+// to.
+enum class CopyTarget { Buffer, Pages };
+
+class CopyRoof {
+   public:
+    // For copies of up to so many bytes. Unsupported on queues without timestamps.
+    static Expected<CopyRoof> create(const VulkanContext& vulkan, uint64_t read_bytes_max, uint64_t written_bytes_max);
+
+    // Microseconds of one copy; blocking. The kernel is the fastest of several workgroup sizes and of one or four
+    // stores per lane, found at the first call for a target.
+    Expected<double> run(CopyTarget target, uint64_t read_bytes, uint64_t written_bytes);
+
+   private:
+    struct Image {
+        GpuImage image;
+        ImageViewHandle view;
+    };
+    Expected<void> createPages(const VulkanContext& vulkan, uint64_t written_bytes_max);
+    Expected<void> createKernel(const VulkanContext& vulkan);
+    Expected<double> runVariant(size_t variant, CopyTarget target, uint64_t read_bytes, uint64_t written_bytes);
+
+    VulkanContext vulkan_;
+    std::optional<Transfer> transfer_;
+    std::optional<UpdateTimer> timer_;
+    TexelBuffer source_;
+    GpuBuffer target_;
+    Image pages_[2];
+    std::optional<Kernel> kernel_;
+    std::optional<size_t> best_[2];  // per target
+    uint32_t groups_x_max_ = 0;
+};
+
+}  // namespace dimmer

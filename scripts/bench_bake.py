@@ -1,0 +1,202 @@
+"""Accuracy of the baker and of the reference path tracer; see docs/measurements.md.
+
+Called by scripts/bench bake. Levels and irradiance that an independent path tracer computed for them are expected in
+../shared/levels and ../shared/truth; without them only the house is measured.
+"""
+import argparse
+import csv
+import json
+import math
+import os
+import pathlib
+import subprocess
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+LEVELS = ROOT.parent / "shared/levels"
+TRUTH = ROOT.parent / "shared/truth"
+PAGE = ROOT / "docs/measurements.md"
+DIMMER = str((ROOT / os.environ.get("DIMMER_BIN", "build/bin") / "dimmer").resolve())
+HOUSE = ROOT / "game_sample/levels/house.gltf"
+NORMAL_MEAN, NORMAL_P95 = math.sqrt(2 / math.pi), 1.959964  # magnitude of a standard normal number
+
+
+def dimmer(*arguments):
+    done = subprocess.run([DIMMER, *map(str, arguments)], capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(f"dimmer {' '.join(map(str, arguments))}\n{done.stderr}")
+    return done.stdout
+
+
+def luminance(rgb):
+    return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+
+
+def read(file):
+    """Rows as (luminance, its standard error or 0); the error as if the channels erred together, its upper bound."""
+    with open(file) as stream:
+        rows = [[float(x) for x in row] for row in list(csv.reader(stream))[1:]]
+    return [(luminance(r[6:9]), luminance(r[9:12]) if len(r) > 9 else 0.0) for r in rows]
+
+
+def without(measured, noise):
+    return math.sqrt(max(0.0, measured**2 - noise**2))
+
+
+def light_error(values, truth, floor):
+    """Mean and 95th percentile of |E - E_ref| / (E_ref + floor), the truth's noise off in quadrature; bias."""
+    kept = [(v, t, s) for (v, _), (t, s) in zip(values, truth) if not math.isnan(v) and t + floor > 0]
+    errors = sorted(abs(v - t) / (t + floor) for v, t, _ in kept)
+    noise = sum(s / (t + floor) for _, t, s in kept) / len(kept)
+    p95 = errors[math.ceil(0.95 * len(errors)) - 1]
+    total = sum(t for _, t, _ in kept)
+    bias = (sum(v for v, _, _ in kept) - total) / total if total > 0 else 0
+    return without(sum(errors) / len(errors), NORMAL_MEAN * noise), without(p95, NORMAL_P95 * noise), bias, len(kept)
+
+
+def effect_error(values, truth):
+    """sum |dE - dE_ref| / sum |dE_ref| over points where |dE_ref| exceeds three standard errors."""
+    kept = [(v, t, s) for (v, _), (t, s) in zip(values, truth) if not math.isnan(v) and abs(t) > 3 * s]
+    scale = sum(abs(t) for _, t, _ in kept)
+    if scale == 0:
+        return None
+    measured = sum(abs(v - t) for v, t, _ in kept) / scale
+    noise = NORMAL_MEAN * sum(s for _, _, s in kept) / scale
+    return without(measured, noise), sum(v - t for v, t, _ in kept) / scale, noise, len(kept)
+
+
+def minus(a, b):
+    return [(x - y, math.hypot(s, t)) for (x, s), (y, t) in zip(a, b)]
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "|" + "|".join([" --- "] + [" ---: "] * (len(header) - 1)) + "|"]
+    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    return "\n".join(lines)
+
+
+def percent(x):
+    return f"{100 * x:.2f} %"
+
+
+def level_states(level):
+    return json.loads((TRUTH / f"{level}.json").read_text())["states"]
+
+
+def reference_table(levels, paths, folder):
+    rows = []
+    for level in levels:
+        jobs = [(kind, name, state, f"{level}.{kind}.points.csv", f"{level}.{kind}.{name}.csv")
+                for name, state in level_states(level).items() for kind in ("surface", "free")]
+        openings = TRUTH / f"{level}.openings.json"
+        for i, opening in enumerate(json.loads(openings.read_text())["openings"] if openings.exists() else []):
+            points = f"{level}.opening_{i}.points.csv"
+            jobs.append((f"opening {i}", "closed", "", points, f"{level}.opening_{i}.closed.csv"))
+            jobs.append((f"opening {i}", "open", opening["state"], points, f"{level}.opening_{i}.open.csv"))
+        for kind, name, state, points, truth_file in jobs:
+            out = folder / "reference.csv"
+            dimmer("reference", LEVELS / f"{level}.glb", "--points", TRUTH / points, "--state", state, "--paths", paths,
+                   "-o", out)
+            ours, truth = read(out), read(TRUTH / truth_file)
+            pairs = [(a - b, math.hypot(s, t)) for (a, s), (b, t) in zip(ours, truth)]
+            z2 = [d * d / (s * s) for d, s in pairs if s > 0]
+            wrong = sum(1 for d, s in pairs if s == 0 and d != 0)
+            total = sum(t for t, _ in truth)
+            difference, noise = sum(d for d, _ in pairs), math.sqrt(sum(s * s for _, s in pairs))
+            cells = ["black in both" if not wrong else f"{wrong} points differ", "", ""] if not z2 else [
+                f"{sum(z2) / len(z2):.3f}", f"{math.sqrt(2 / len(z2)):.3f}", f"{max(z2) ** 0.5:.1f}"]
+            mean = f"{100 * difference / total:+.2f} ± {100 * noise / total:.2f} %" if total > 0 else ""
+            rows.append([level, kind, name, str(len(z2)), *cells, mean])
+            print(*rows[-1], flush=True)
+    return table(["level", "points", "state", "n", "chi²/n", "its σ", "largest z", "mean difference"], rows)
+
+
+def pack_tables(levels, quality, folder):
+    errors, effects = [], []
+    for level in levels:
+        pack = folder / f"{level}.dimmer"
+        dimmer("cook", LEVELS / f"{level}.glb", "-o", pack, "--quality", quality)
+        states = {n: s for n, s in level_states(level).items() if "door:" not in s}
+        truth = {n: read(TRUTH / f"{level}.surface.{n}.csv") for n in states}
+        floor = 0.01 * sum(t for t, _ in truth["all_on"]) / len(truth["all_on"])
+        ours = {}
+        for name, state in states.items():
+            out = folder / "sample.csv"
+            dimmer("sample", pack, "--points", TRUTH / f"{level}.surface.points.csv", "--state", state, "-o", out)
+            ours[name] = read(out)
+            mean, p95, bias, n = light_error(ours[name], truth[name], floor)
+            errors.append([level, name, str(n), percent(mean), percent(p95), f"{100 * bias:+.2f} %"])
+            print(*errors[-1], flush=True)
+        parts = [("first set", "only_first", "all_off"), ("middle set", "only_middle", "all_off"),
+                 ("all sets but the first", "all_on", "only_first")]
+        for what, lit, unlit in parts:
+            if lit not in states or unlit not in states:
+                continue
+            effect = effect_error(minus(ours[lit], ours[unlit]), minus(truth[lit], truth[unlit]))
+            cells = ["below the truth's noise", "", "", "0"] if effect is None else [
+                percent(effect[0]), f"{100 * effect[1]:+.2f} %", percent(effect[2]), str(effect[3])]
+            effects.append([level, what, *cells])
+            print(*effects[-1], flush=True)
+    return (table(["level", "state", "points", "mean error", "95th percentile", "bias"], errors),
+            table(["level", "what", "error", "bias", "truth's noise", "points"], effects))
+
+
+def verify_tables(levels, quality, points, paths, folder):
+    errors, effects = [], []
+    for name, level in levels:
+        pack, report = folder / "verify.dimmer", folder / "verify.json"
+        dimmer("cook", level, "-o", pack, "--quality", quality)
+        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--json", report)
+        found = json.loads(report.read_text())
+        for kind in ("surface", "tilted"):
+            f = found[kind]
+            errors.append([name, kind, str(f["points"]), percent(f["mean"]), percent(f["p95"]), percent(f["rmse"]),
+                           f"{100 * f['bias']:+.2f} %", percent(f["reference_relative_standard_error"])])
+            print(*errors[-1], flush=True)
+        for s in found["sets"]:
+            effects.append([name, s["name"], percent(s["error"]), f"{100 * s['bias']:+.2f} %",
+                            percent(s["reference_noise"]), str(s["points"]), percent(s["energy_dropped"])])
+            print(*effects[-1], flush=True)
+    return (table(["level", "normals", "points", "mean", "95th percentile", "RMSE", "bias", "reference error"], errors),
+            table(["level", "light set", "error", "bias", "reference noise", "points", "energy dropped"], effects))
+
+
+def refresh(topic, text):
+    begin, end = f"<!-- {topic}: begin -->", f"<!-- {topic}: end -->"
+    page = PAGE.read_text()
+    if begin not in page or end not in page:
+        raise SystemExit(f"{PAGE}: the markers of '{topic}' are missing")
+    head, tail = page[:page.index(begin)], page[page.index(end):]
+    PAGE.write_text(f"{head}{begin}\n{text}\n{tail}")
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="scripts/bench bake", description=__doc__.splitlines()[0])
+    parser.add_argument("--levels", nargs="*", default=["two_rooms", "lq_old_start", "lq_e2m2", "lq_e2m3"])
+    parser.add_argument("--quality", default="draft", choices=["draft", "preview", "final"])
+    parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
+    parser.add_argument("--points", type=int, default=500, help="verify's random points")
+    parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
+    parser.add_argument("--only", choices=["reference", "packs", "verify"], help="one part of it")
+    options = parser.parse_args()
+    levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
+    if not levels:
+        print("the levels with given irradiance are not here: the house alone is measured")
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        if levels and options.only in (None, "reference"):
+            refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
+                    + reference_table(levels, options.paths, folder))
+        if levels and options.only in (None, "packs"):
+            errors, effects = pack_tables(levels, options.quality, folder)
+            refresh(f"packs {options.quality}", f"`scripts/bench bake --only packs --quality {options.quality}`\n\n"
+                    f"{errors}\n\n{effects}")
+        if options.only in (None, "verify"):
+            measured = [("house", HOUSE)] + [(n, LEVELS / f"{n}.glb") for n in levels if n == "two_rooms"]
+            errors, effects = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
+            refresh(f"verify {options.quality}", f"`scripts/bench bake --only verify --quality {options.quality} "
+                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n{errors}\n\n{effects}")
+
+
+if __name__ == "__main__":
+    main()

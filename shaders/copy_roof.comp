@@ -1,0 +1,46 @@
+// The roof for updates: loads and stores as many bytes as they do, and computes nothing. See gpu/copy_roof.h.
+#version 450
+
+layout(local_size_x_id = 0) in;
+layout(constant_id = 1) const int loads = 3;        // of 16 bytes, per 16 bytes stored
+layout(constant_id = 2) const int lane_stores = 4;  // 16 bytes that a lane stores, one after another
+layout(constant_id = 3) const bool to_pages = false;
+
+layout(push_constant) uniform Copy {
+    uint first, count;  // units of 16 bytes to store
+    uint stride;        // from one stream of loads to the next
+    uint page_width;
+}
+copy;
+
+layout(set = 0, binding = 0) uniform utextureBuffer source;
+layout(set = 0, binding = 1, std430) writeonly buffer Target { uvec4 target[]; };
+layout(set = 0, binding = 2, r32ui) writeonly uniform uimage2DArray pages_0;
+layout(set = 0, binding = 3, r32ui) writeonly uniform uimage2DArray pages_1;
+
+void store(uint unit, uvec4 value) {
+    if (to_pages) {
+        ivec3 texel = ivec3(unit * 2u % copy.page_width, unit * 2u / copy.page_width, 0);
+        imageStore(pages_0, texel, uvec4(value.x));
+        imageStore(pages_1, texel, uvec4(value.y));
+        texel.x += 1;
+        imageStore(pages_0, texel, uvec4(value.z));
+        imageStore(pages_1, texel, uvec4(value.w));
+    } else {
+        target[unit] = value;
+    }
+}
+
+void main() {
+    uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    // Eight neighbouring lanes side by side, as in blend_texels.comp.
+    uint lane = gl_LocalInvocationIndex;
+    uint begin = (group * gl_WorkGroupSize.x + lane / 8u * 8u) * uint(lane_stores) + lane % 8u;
+    for (int i = 0; i < lane_stores; ++i) {
+        uint unit = begin + uint(i) * 8u;
+        if (unit >= copy.count) return;
+        uvec4 value = uvec4(0);
+        for (int s = 0; s < loads; ++s) value ^= texelFetch(source, int(uint(s) * copy.stride + copy.first + unit));
+        store(copy.first + unit, value);
+    }
+}

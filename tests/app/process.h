@@ -1,0 +1,22 @@
+// Runs a tool as a user's shell would.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace dimmer::test {
+
+struct ProcessResult {
+    int exit_code = -1;  // 128 + the signal's number when it was killed, as shells say it
+    std::string out, err;
+};
+
+// Waits for the end. `input` is what it reads on stdin.
+ProcessResult runProcess(const std::string& program, const std::vector<std::string>& arguments,
+                         const std::string& input = "");
+
+inline ProcessResult runDimmer(const std::vector<std::string>& arguments, const std::string& input = "") {
+    return runProcess(DIMMER_TOOL, arguments, input);
+}
+
+}  // namespace dimmer::test

@@ -1,0 +1,148 @@
+// Bad content behind good hashes: what a careless tool or an attacker writes. The table parsers and validate() must
+// either refuse it or hand out data that executors can run on.
+#include <dimmer/cpu_runtime.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <pack/pack_file.h>
+#include <pack/sample_pack.h>
+#include <write/pack_writer.h>
+
+#include <functional>
+
+namespace dimmer::test {
+namespace {
+
+using cook::packBytes;
+using testing::HasSubstr;
+
+struct Fault {
+    const char* name;
+    std::function<void(PackFile&)> apply;
+    std::string message;
+};
+
+// Byte offsets are those of docs/format.md.
+const Fault faults[] = {
+    {"elements: a count past the chunk", [](PackFile& f) { f.chunk("ELEM").write(0, 7u); }, "ELEM is malformed"},
+    {"elements: a huge count", [](PackFile& f) { f.chunk("ELEM").write(0, UINT32_MAX); }, "ELEM is malformed"},
+    {"elements: a huge name", [](PackFile& f) { f.chunk("ELEM").write(4, UINT32_MAX); }, "ELEM is malformed"},
+    {"elements: bytes left over", [](PackFile& f) { f.chunk("ELEM").bytes.push_back({}); }, "ELEM is malformed"},
+    {"elements: nothing at all", [](PackFile& f) { f.chunk("ELEM").bytes.clear(); }, "ELEM is malformed"},
+    {"elements: an unknown kind", [](PackFile& f) { f.chunk("ELEM").write(12, 9u); }, "unknown kind"},
+    {"contributions: a huge count", [](PackFile& f) { f.chunk("CONT").write(0, UINT32_MAX); }, "CONT is malformed"},
+    {"contributions: huge lists", [](PackFile& f) { f.chunk("CONT").write(8, 0x40000000u); }, "CONT is malformed"},
+    {"contributions: no such set", [](PackFile& f) { f.chunk("CONT").write(4, 77u); },
+     "contribution 0 has no such set"},
+    {"contributions: NaN", [](PackFile& f) { f.chunk("CONT").write(20, NAN); }, "contribution 0"},
+    {"contributions: other receivers", [](PackFile& f) { f.chunk("CONT").write(16, 1u); }, "PAYL 0"},
+    {"base: half a record", [](PackFile& f) { f.chunk("BASE").bytes.pop_back(); }, "BASE ends within a record"},
+    {"base: too few", [](PackFile& f) { f.chunk("BASE").bytes.resize(8); }, "its base holds 1 texels"},
+    {"clusters: half a record", [](PackFile& f) { f.chunk("CLUS").bytes.pop_back(); }, "CLUS ends within a record"},
+    {"clusters: none", [](PackFile& f) { f.chunk("CLUS").bytes.clear(); }, "do not cover its tables"},
+    {"clusters: a huge count", [](PackFile& f) { f.chunk("CLUS").write(4, UINT32_MAX); }, "cluster 0 reaches past"},
+    {"clusters: huge terms", [](PackFile& f) { f.chunk("CLUS").write(20, UINT32_MAX); }, "cluster 0 reaches past"},
+    {"clusters: overlapping", [](PackFile& f) { f.chunk("CLUS").write(24, 0u); }, "cluster 1 does not follow"},
+    {"terms: half a record", [](PackFile& f) { f.chunk("TERM").bytes.pop_back(); }, "TERM ends within a record"},
+    {"terms: no such contribution", [](PackFile& f) { f.chunk("TERM").write(0, 999u); }, "names contribution 999"},
+    {"terms: records elsewhere", [](PackFile& f) { f.chunk("TERM").write(4, UINT32_MAX); }, "misplaces its records"},
+    {"batches: half a record", [](PackFile& f) { f.chunk("BTCH").bytes.pop_back(); }, "BTCH ends within a record"},
+    {"batches: overlapping", [](PackFile& f) { f.chunk("BTCH").write(8, 0u); }, "batch 1 does not follow"},
+    {"batches: huge", [](PackFile& f) { f.chunk("BTCH").write(4, UINT32_MAX); }, "batch 0 does not follow"},
+    {"addresses: half a record", [](PackFile& f) { f.chunk("ADDR").bytes.pop_back(); }, "ADDR ends within a record"},
+    {"addresses: outside", [](PackFile& f) { f.chunk("ADDR").write(0, UINT32_MAX); }, "outside the pages"},
+    {"payload: half a record", [](PackFile& f) { f.chunk("PAYL", 2).bytes.pop_back(); }, "PAYL 2 ends within"},
+    {"payload: too many", [](PackFile& f) { f.chunk("PAYL", 2).bytes.resize(f.chunk("PAYL", 2).bytes.size() + 8); },
+     "PAYL 2 holds"},
+    {"meshes: a huge count", [](PackFile& f) { f.chunk("MESH").write(0, UINT32_MAX); }, "MESH is malformed"},
+    {"meshes: cut short", [](PackFile& f) { f.chunk("MESH").bytes.pop_back(); }, "MESH is malformed"},
+    {"meshes: no such page", [](PackFile& f) { f.chunk("MESH").write(13, 2u); }, "mesh 'floor' lies on page 2"},
+    {"meshes: huge vertex count", [](PackFile& f) { f.chunk("MESH").write(49, 0x0fffffffu); }, "MESH is malformed"},
+    {"meshes: NaN", [](PackFile& f) { f.chunk("MESH").write(53, NAN); }, "mesh 'floor' has a vertex"},
+    {"viewpoints: a huge count", [](PackFile& f) { f.chunk("VIEW").write(0, UINT32_MAX); }, "VIEW is malformed"},
+    {"viewpoints: NaN", [](PackFile& f) { f.chunk("VIEW").write(20, NAN); }, "viewpoint 'player_start'"},
+    {"settings: a huge text", [](PackFile& f) { f.chunk("SETT").write(0, UINT32_MAX); }, "SETT is malformed"},
+    {"header: no pages", [](PackFile& f) { f.header.page_count = 0; }, "0 pages"},
+    {"header: huge pages", [](PackFile& f) { f.header.page_width = UINT32_MAX; }, "pages of 4294967295"},
+    {"header: other pages", [](PackFile& f) { f.header.page_height = 31; }, "its base holds"},
+    {"header: NaN", [](PackFile& f) { f.header.exposure = NAN; }, "its exposure is nan"},
+};
+
+TEST(PackContent, FaultsAreNamed) {
+    const PackFile good(packBytes(samplePack()));
+    ASSERT_TRUE(Pack::fromBytes(good.bytes(), "test").has_value());
+    for (const Fault& fault : faults) {
+        PackFile file = good;
+        fault.apply(file);
+        const auto pack = Pack::fromBytes(file.bytes(), "level.dimmer");
+        ASSERT_FALSE(pack.has_value()) << fault.name;
+        EXPECT_EQ(pack.error().code, ErrorCode::BadInput) << fault.name;
+        EXPECT_THAT(pack.error().message, HasSubstr(fault.message)) << fault.name;
+        EXPECT_THAT(pack.error().message, testing::StartsWith("level.dimmer: ")) << fault.name;
+    }
+}
+
+void mutate(ChunkContent& chunk, Random& random) {
+    auto& bytes = chunk.bytes;
+    const uint32_t words[] = {0,          1,          63,         64,         65,   0x7fffffff,
+                              0x80000000, 0x7fc00000, UINT32_MAX, 0x3f800000, 4096, static_cast<uint32_t>(random())};
+    const uint32_t last_word = std::size(words) - 1;
+    switch (bytes.empty() ? 4 : pick(random, 0, 4)) {
+        case 0:  // a 32-bit word in its place
+        case 1:
+            if (bytes.size() >= 4)
+                chunk.write(4 * pick(random, 0, static_cast<uint32_t>(bytes.size() / 4) - 1),
+                            words[pick(random, 0, last_word)]);
+            break;
+        case 2:
+            bytes[random() % bytes.size()] ^= std::byte{1} << pick(random, 0, 7);
+            break;
+        case 3:
+            bytes.resize(random() % bytes.size());
+            break;
+        case 4:
+            bytes.resize(bytes.size() + pick(random, 1, 64));
+            break;
+    }
+}
+
+// Everything that an executor and a tool do with a pack.
+void run(const Pack& pack) {
+    CpuRuntime runtime(pack);
+    EXPECT_LE(runtime.update().receivers, pack.data().addresses.size());
+    for (uint32_t e = 0; e < pack.elements().size(); ++e) {
+        const bool set = pack.elements()[e].kind == ElementKind::LightSet;
+        EXPECT_TRUE(set ? runtime.setWeight({e}, 0) : runtime.setDoor({e}, 1));
+    }
+    EXPECT_LE(runtime.update().receivers, pack.data().addresses.size());
+    for (const Mesh& mesh : pack.meshes())
+        for (const MeshVertex& v : mesh.vertices)
+            sampleLightmap(pack, runtime.irradiancePages(), runtime.directionPages(), mesh.page, v.lightmap_uv,
+                           {0, 0, 1});
+}
+
+// Whatever is accepted must be safe to run: the sanitizers watch the second half of this test.
+TEST(PackContent, RandomFaultsAreRefusedOrHarmless) {
+    const PackFile good(packBytes(samplePack()));
+    int refused = 0, accepted = 0;
+    for (uint32_t seed = 0; seed < 3000; ++seed) {
+        Random random(seed);
+        PackFile file = good;
+        const uint32_t count = pick(random, 1, 3);
+        for (uint32_t i = 0; i < count; ++i) mutate(file.chunks[random() % file.chunks.size()], random);
+        const auto pack = Pack::fromBytes(file.bytes(), "test");
+        if (!pack) {
+            ++refused;
+            EXPECT_EQ(pack.error().code, ErrorCode::BadInput) << seed;
+            EXPECT_GT(pack.error().message.size(), 20u) << seed;
+            continue;
+        }
+        ++accepted;
+        run(*pack);
+    }
+    // Both happen often, or the test looks at nothing.
+    EXPECT_GT(refused, 300);
+    EXPECT_GT(accepted, 300);
+}
+
+}  // namespace
+}  // namespace dimmer::test

@@ -1,0 +1,145 @@
+// A pack on disk is as it was or complete, whatever happens while it is written.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <scene/level_file.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <write/pack_writer.h>
+
+#include <csignal>
+#include <fstream>
+#include <sstream>
+
+namespace dimmer::cook::test {
+namespace {
+
+using testing::HasSubstr;
+
+Expected<void> write(const std::filesystem::path& path, const std::string& text) {
+    return writeFileAtomically(path, std::as_bytes(std::span(text)));
+}
+
+std::string read(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
+}
+
+size_t filesIn(const std::filesystem::path& folder) {
+    return static_cast<size_t>(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
+
+void expectIoError(const Expected<void>& done, const std::filesystem::path& path, const char* reason) {
+    ASSERT_FALSE(done.has_value()) << path;
+    EXPECT_EQ(done.error().code, ErrorCode::Io) << path;
+    EXPECT_THAT(done.error().message, HasSubstr(path.string()));
+    EXPECT_THAT(done.error().message, HasSubstr(reason));
+}
+
+// No file may grow past `bytes` while this lives: a full disk without filling one.
+class FileSizeLimit {
+   public:
+    explicit FileSizeLimit(rlim_t bytes) {
+        getrlimit(RLIMIT_FSIZE, &before_);
+        handler_ = std::signal(SIGXFSZ, SIG_IGN);  // so that write() fails instead
+        const rlimit limit{bytes, before_.rlim_max};
+        setrlimit(RLIMIT_FSIZE, &limit);
+    }
+    ~FileSizeLimit() {
+        setrlimit(RLIMIT_FSIZE, &before_);
+        std::signal(SIGXFSZ, handler_);
+    }
+    FileSizeLimit(const FileSizeLimit&) = delete;
+    FileSizeLimit& operator=(const FileSizeLimit&) = delete;
+
+   private:
+    rlimit before_{};
+    void (*handler_)(int) = nullptr;
+};
+
+TEST(WriteFile, MakesAndReplaces) {
+    const TemporaryFolder folder;
+    const auto path = folder.path / "a.dimmer";
+    ASSERT_TRUE(write(path, "one"));
+    EXPECT_EQ(read(path), "one");
+    ASSERT_TRUE(write(path, "the second"));
+    EXPECT_EQ(read(path), "the second");
+    ASSERT_TRUE(write(path, ""));
+    EXPECT_EQ(read(path), "");
+    EXPECT_EQ(filesIn(folder.path), 1u);
+    // Readable as any file that the user makes.
+    struct stat status {};
+    stat(path.c_str(), &status);
+    const mode_t mask = umask(0);
+    umask(mask);
+    EXPECT_EQ(status.st_mode & 0777, 0666 & ~mask);
+}
+
+TEST(WriteFile, AFullDiskLeavesTheOldFile) {
+    const TemporaryFolder folder;
+    const auto path = folder.path / "a.dimmer";
+    ASSERT_TRUE(write(path, "old"));
+    {
+        const FileSizeLimit full(1 << 16);
+        expectIoError(write(path, std::string(1 << 20, 'x')), path, "nothing was changed");
+        expectIoError(write(folder.path / "b.dimmer", std::string(1 << 20, 'x')), folder.path / "b.dimmer", "large");
+    }
+    EXPECT_EQ(read(path), "old");
+    EXPECT_EQ(filesIn(folder.path), 1u);  // no temporary, no b.dimmer
+}
+
+TEST(WriteFile, FoldersThatCannotBeWritten) {
+    const TemporaryFolder folder;
+    expectIoError(write(folder.path / "none/a.dimmer", "x"), folder.path / "none/a.dimmer", "there is no folder");
+    folder.write("file", "x", 1);
+    expectIoError(write(folder.path / "file/a.dimmer", "x"), folder.path / "file/a.dimmer", "there is no folder");
+    expectIoError(write("/proc/a.dimmer", "x"), "/proc/a.dimmer", "in this folder");  // even for root
+    EXPECT_FALSE(write("", "x").has_value());
+}
+
+TEST(WriteFile, AFolderWithoutRightsLeavesTheOldFile) {
+    if (geteuid() == 0) GTEST_SKIP() << "root may write anywhere";
+    const TemporaryFolder folder;
+    const auto path = folder.path / "a.dimmer";
+    ASSERT_TRUE(write(path, "old"));
+    std::filesystem::permissions(folder.path, std::filesystem::perms::owner_read | std::filesystem::perms::owner_exec);
+    expectIoError(write(path, "new"), path, "in this folder");
+    expectIoError(write(folder.path / "b.dimmer", "new"), folder.path / "b.dimmer", "in this folder");
+    std::filesystem::permissions(folder.path, std::filesystem::perms::owner_all);
+    EXPECT_EQ(read(path), "old");
+    EXPECT_EQ(filesIn(folder.path), 1u);
+}
+
+TEST(WriteFile, AFolderIsNotReplaced) {
+    const TemporaryFolder folder;
+    expectIoError(write(folder.path, "x"), folder.path, "directory");
+    const auto full = folder.path / "full";
+    std::filesystem::create_directory(full);
+    std::ofstream(full / "inside") << "kept";
+    expectIoError(write(full, "x"), full, "directory");
+    EXPECT_EQ(read(full / "inside"), "kept");
+    EXPECT_EQ(filesIn(folder.path), 1u);
+}
+
+TEST(WriteFile, DevicesAreWrittenToAndNeverReplaced) {
+    ASSERT_TRUE(write("/dev/null", "x"));
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+    expectIoError(write("/dev/full", "x"), "/dev/full", "No space left");
+    EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
+TEST(WriteFile, LinksAreFollowed) {
+    const TemporaryFolder folder;
+    const auto target = folder.path / "target", link = folder.path / "link";
+    ASSERT_TRUE(write(target, "old"));
+    std::filesystem::create_symlink("target", link);
+    ASSERT_TRUE(write(link, "new"));
+    EXPECT_TRUE(std::filesystem::is_symlink(link));
+    EXPECT_EQ(read(target), "new");
+    EXPECT_EQ(filesIn(folder.path), 2u);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

@@ -1,0 +1,172 @@
+// The error measures by arithmetic, and what verify says of packs that are right, wrong and black.
+#include <bake/test_scenes.h>
+#include <format/texel.h>
+#include <pipeline/cooked_level.h>
+#include <pipeline/heat_map.h>
+#include <pipeline/verify.h>
+#include <scene/level_file.h>
+
+#include <random>
+
+namespace dimmer::cook::test {
+namespace {
+
+TEST(LightError, IsWhatItsFormulaSays) {
+    // Errors 0.1, 0.2, 0.3, ... 2.0 of 10 + 10 lux.
+    std::vector<LightPair> pairs;
+    for (int i = 1; i <= 20; ++i) pairs.push_back({10 + 2.0 * i, 10, 0});
+    const ErrorFigures f = lightError(pairs, 10);
+    EXPECT_EQ(f.points, 20u);
+    EXPECT_NEAR(f.mean, 1.05, 1e-12);
+    EXPECT_NEAR(f.p95, 1.9, 1e-12);  // the 19th of 20
+    EXPECT_NEAR(f.rmse, 2 * std::sqrt(20 * 21 * 41 / 6.0 / 20) / 10, 1e-12);
+    EXPECT_NEAR(f.bias, 2 * 10.5 / 10, 1e-12);
+    EXPECT_EQ(f.reference_error_mean, 0);
+}
+
+TEST(LightError, TakesTheReferencesNoiseOff) {
+    // A perfect pack against a noisy reference, and one that is 10 % too bright everywhere.
+    std::mt19937 random(3);
+    std::normal_distribution<double> noise(0, 2);
+    std::vector<LightPair> right, bright;
+    for (int i = 0; i < 20000; ++i) {
+        const double reference = 100 + noise(random);
+        right.push_back({100, reference, 2});
+        bright.push_back({110, reference, 2});
+    }
+    EXPECT_LT(lightError(right, 0).mean, 0.003);
+    EXPECT_LT(lightError(right, 0).rmse, 0.003);
+    EXPECT_NEAR(lightError(right, 0).measured_mean, 0.02 * std::sqrt(2 / std::numbers::pi), 0.0005);
+    EXPECT_NEAR(lightError(bright, 0).mean, 0.1, 0.002);
+    EXPECT_NEAR(lightError(bright, 0).bias, 0.1, 0.001);
+}
+
+TEST(LightError, BlackNeedsAFloor) {
+    const std::array black{LightPair{0, 0, 0}, LightPair{1, 0, 0}};
+    EXPECT_EQ(lightError(black, 0).points, 0u);
+    EXPECT_DOUBLE_EQ(lightError(black, 4).mean, 0.125);
+}
+
+TEST(EffectError, IgnoringAnElementScoresOne) {
+    const std::array pairs{LightPair{0, 10, 0.1}, LightPair{0, -5, 0.1}, LightPair{7, 0.2, 0.1}};
+    const EffectFigures f = effectError(pairs);
+    EXPECT_EQ(f.points, 2u);  // the third is within three standard errors of nothing
+    EXPECT_NEAR(f.measured_error, 1, 1e-12);
+    EXPECT_NEAR(f.bias, -5.0 / 15, 1e-12);
+    EXPECT_EQ(effectError({}).points, 0u);
+}
+
+// A furnace: E = pi L / (1 - rho) for every place and normal, so that what verify reports is the pack's doing.
+Scene furnace() {
+    Scene scene;
+    scene.file = "furnace";
+    addBox(scene, {1, 1.5f, 2}, addMaterial(scene, emissive(glm::vec3(3), 0.5f)));
+    scene.meshes[0].light_set = 0;
+    for (SceneMesh& mesh : scene.meshes) mesh.light_set = 0;
+    scene.light_sets = {{"glow", 1}};
+    return scene;
+}
+
+VerifyOptions quick() {
+    return {.state = "", .points = 60, .paths_max = 2048, .seed = 1, .sets = true};
+}
+
+TEST(Verify, ARightPackIsFoundRight) {
+    const Scene scene = furnace();
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    SilentProgress progress;
+    const auto report = verify(scene, *pack, quick(), progress);
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->surface.points, 60u);
+    EXPECT_NEAR(report->floor_lux, 0.01 * std::numbers::pi * 3 / 0.5, 0.02 * report->floor_lux);
+    EXPECT_LE(report->surface.mean, 0.03);
+    EXPECT_LE(report->tilted.mean, 0.05);
+    ASSERT_EQ(report->sets.size(), 1u);
+    EXPECT_LE(report->sets[0].effect.error, 0.05);
+    for (const VerifyPoint& p : report->points) {
+        EXPECT_NEAR(glm::length(p.tilted), 1, 1e-5);
+        EXPECT_GE(glm::dot(p.tilted, p.frame.normal), 0.4999f);
+    }
+}
+
+// The same pack with half the light in its records: 50 % off, and said so.
+TEST(Verify, AWrongPackIsFoundWrong) {
+    const Scene scene = furnace();
+    const auto right = cooked(scene, "draft");
+    ASSERT_TRUE(right);
+    PackData data = right->data();
+    data.exposure *= 2;
+    const auto pack = Pack::fromData(std::move(data));
+    ASSERT_TRUE(pack) << pack.error().message;
+    SilentProgress progress;
+    const auto report = verify(scene, *pack, quick(), progress);
+    ASSERT_TRUE(report) << report.error().message;
+    // |E - E_ref| / (E_ref + floor) = 0.5 / 1.01
+    EXPECT_NEAR(report->surface.mean, 0.5 / 1.01, 0.02);
+    EXPECT_NEAR(report->surface.bias, -0.5, 0.02);
+    EXPECT_NEAR(report->sets[0].effect.error, 0.5, 0.02);
+    EXPECT_TRUE(report->converged);
+}
+
+TEST(Verify, AnswersWhatItCannotMeasure) {
+    const Scene scene = furnace();
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    SilentProgress progress;
+    VerifyOptions unknown = quick();
+    unknown.state = "glwo=1";
+    const auto no_set = verify(scene, *pack, unknown, progress);
+    ASSERT_FALSE(no_set);
+    EXPECT_NE(no_set.error().message.find("did you mean \"glow\""), std::string::npos) << no_set.error().message;
+    Scene other = scene;
+    other.light_sets[0].name = "gleam";
+    EXPECT_EQ(verify(other, *pack, quick(), progress).error().code, ErrorCode::BadInput);
+    Scene black = scene;
+    for (Material& m : black.materials) m.emission_cd_m2 = glm::vec3(0);
+    const auto dark = cooked(black, "draft");
+    ASSERT_TRUE(dark);
+    EXPECT_EQ(verify(black, *dark, quick(), progress).error().code, ErrorCode::BadInput);
+}
+
+TEST(ReferenceState, ReadsSetsAndDoors) {
+    Scene scene;
+    scene.light_sets = {{"hall", 1}, {"alarm", 1}};
+    scene.doors = {{"front", false, {0, 0, 0, 1}, {}}, {"back", true, {0, 0, 0, 1}, {}}};
+    const auto state = readReferenceState(scene, "alarm=1/0.5/0.25,door:front=1,all=0.5");
+    ASSERT_TRUE(state) << state.error().message;
+    EXPECT_EQ(state->set_weights[0], glm::vec3(0.5f));
+    EXPECT_EQ(state->set_weights[1], glm::vec3(1, 0.5f, 0.25f));
+    EXPECT_EQ(state->door_open, (std::vector<bool>{true, false}));
+    EXPECT_EQ(readReferenceState(scene, "door:front=0.5").error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(readReferenceState(scene, "door:back=1").error().code, ErrorCode::Unsupported);
+    EXPECT_TRUE(readReferenceState(scene, "door:back=0"));
+    EXPECT_EQ(readReferenceState(scene, "door:side=1").error().code, ErrorCode::NotFound);
+
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addFloor(scene, 1, white).door = 0;
+    addFloor(scene, 1, white).door = 1;
+    addFloor(scene, 1, white);
+    const Scene open = sceneInState(scene, *state);
+    ASSERT_EQ(open.meshes.size(), 2u);
+    EXPECT_EQ(open.meshes[0].door, 1u);
+}
+
+TEST(HeatMap, WritesOnePicturePerPage) {
+    const Scene scene = furnace();
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    SilentProgress progress;
+    VerifyOptions options = quick();
+    options.sets = false;
+    const auto report = verify(scene, *pack, options, progress);
+    ASSERT_TRUE(report);
+    const TemporaryFolder folder;
+    ASSERT_TRUE(writeHeatMaps(folder.path / "new", *pack, *report, ""));
+    for (uint32_t page = 0; page < pack->pageCount(); ++page)
+        EXPECT_GT(std::filesystem::file_size(folder.path / "new" / ("page_" + std::to_string(page) + ".png")), 100u);
+    EXPECT_EQ(writeHeatMaps("/proc/no/such/place", *pack, *report, "").error().code, ErrorCode::Io);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
