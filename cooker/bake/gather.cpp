@@ -22,15 +22,14 @@ void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
     moment_lux += luminance(lux) * direction_tangent;
 }
 
-void Gatherer::gather(size_t receiver, const GatherOptions& options, const SparseLight* outgoing,
+void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                       GroupAccumulator<Gathered>& sum, uint32_t* hits) const {
-    const uint32_t seed = hash(options.seed, static_cast<uint32_t>(receiver));
-    const uint32_t points = texels_.sampleCount(receiver);
+    const uint32_t seed = hash(options.seed, from.id);
     const glm::vec3 sky = rays_.scene().sky_radiance_cd_m2;
     const float lux_per_radiance = pi / static_cast<float>(options.rays);
     for (uint32_t i = 0; i < options.rays; ++i) {
         const uint32_t index = options.first_ray + i;
-        const SamplePoint& origin = texels_.sample(receiver, index % points);
+        const SamplePoint& origin = from.points[index % from.points.size()];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         const glm::vec3 d = cosineDirection(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
@@ -53,18 +52,18 @@ void Gatherer::gather(size_t receiver, const GatherOptions& options, const Spars
         if (!outgoing) continue;
         for (const GroupLight& light : outgoing->row(found)) sum[light.group].add(light.value * lux_per_radiance, d);
     }
-    if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(receiver, options, sum);
+    if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
 }
 
-void Gatherer::sampleEmitters(size_t receiver, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const {
-    const uint32_t points = texels_.sampleCount(receiver);
+void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,
+                              GroupAccumulator<Gathered>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const SamplePoint& origin = texels_.sample(receiver, i % points);
+        const SamplePoint& origin = from.points[i % from.points.size()];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
-            const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, static_cast<uint32_t>(receiver)), range.group);
+            const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.group);
             const uint32_t index = options.first_ray + i;
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 
 namespace dimmer::cook {
 
@@ -34,6 +35,12 @@ struct GatherOptions {
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
 };
 
+// Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
+struct GatherFrom {
+    std::span<const SamplePoint> points;
+    uint32_t id = 0;
+};
+
 // Thread-safe: gather() only reads.
 class Gatherer {
    public:
@@ -43,11 +50,19 @@ class Gatherer {
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit. `hits`, when given, takes for every ray the receiver that it hit, or no_index.
     // Unbiased: emitters are found by area and by hit, weighted by the balance heuristic (Veach 1995).
-    void gather(size_t receiver, const GatherOptions& options, const SparseLight* outgoing,
+    void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                 GroupAccumulator<Gathered>& sum, uint32_t* hits) const;
 
+    GatherFrom at(size_t receiver) const {
+        return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)}, static_cast<uint32_t>(receiver)};
+    }
+
+    const RayScene& rays() const { return rays_; }
+    const Unwrap& unwrap() const { return unwrap_; }
+    const Texels& texels() const { return texels_; }
+
    private:
-    void sampleEmitters(size_t receiver, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
 
     const RayScene& rays_;
     const Unwrap& unwrap_;
