@@ -28,17 +28,17 @@ HighlightFit fitHighlight(const Gathered& light) {
     return {ambient, d};
 }
 
-TexelRecord encodeTexel(const Gathered& light, float exposure) {
+TexelRecord encodeTexel(const Gathered& light, float exposure, ColorFormat format) {
     const glm::vec3 stored = light.irradiance_lux * exposure;
     const HighlightFit fit = fitHighlight(light);
     const float share = 1 - fit.ambient;
-    return {encodeR11G11B10(stored.x, stored.y, stored.z),
+    return {encodeColor(format, stored.x, stored.y, stored.z),
             encodeDirection(1, fit.ambient, share * fit.direction.x / fit.direction.z,
                             share * fit.direction.y / fit.direction.z)};
 }
 
 float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
-    constexpr float half_of_largest = 64512.0f / 2;  // of the 10-bit channel, the smaller
+    constexpr float half_of_largest = 64512.0f / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
     float largest = 0;
     for (size_t i = 0; i < baked.light.rows(); ++i) {
         glm::vec3 sum(0);

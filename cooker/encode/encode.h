@@ -17,7 +17,7 @@ struct HighlightFit {
 };
 HighlightFit fitHighlight(const Gathered& light);
 
-TexelRecord encodeTexel(const Gathered& light, float exposure);
+TexelRecord encodeTexel(const Gathered& light, float exposure, ColorFormat format);
 
 // The power of two that keeps the largest value reachable with every weight at its maximum below half of the format's
 // largest number. `max_weights`: per light group, 1 for always-on light.
