@@ -19,7 +19,11 @@ glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
 
 void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
     irradiance_lux += lux;
-    moment_lux += luminance(lux) * direction_tangent;
+    // Per unit of irradiance on the surface, whose cosine is z. Light along the surface is bounded, as single rays that
+    // graze it would be mostly noise: of an overcast sky the tilted normals lose 0.4 %.
+    constexpr float z_min = 0.02f;
+    const glm::vec2 slope = direction_tangent * (tilt_sin / std::max(direction_tangent.z, z_min));
+    tilted_lux += luminance(lux) * glm::max(glm::vec4(slope, -slope) + tilt_cos, 0.0f);
 }
 
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,

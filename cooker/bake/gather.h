@@ -12,20 +12,23 @@
 
 namespace dimmer::cook {
 
+// The tilt of Gathered's four normals: cosine and sine. The mean cosine of all normals within 60 degrees.
+inline constexpr float tilt_cos = 0.75f, tilt_sin = 0.66143783f;
+
 // Light of one group at one receiver.
 struct Gathered {
     glm::vec3 irradiance_lux{0};
-    // Integral of luminance * cos(theta) * direction, in the tangent frame: its length over the luminance of the
-    // irradiance says how directional the light is. Adds up over contributions.
-    glm::vec3 moment_lux{0};
+    // Luminance of the irradiance on normals tilted towards +tangent, +bitangent, -tangent and -bitangent: how
+    // irradiance falls off. Light from below the surface is left out. Adds up over contributions.
+    glm::vec4 tilted_lux{0};
 
     void add(glm::vec3 lux, glm::vec3 direction_tangent);
     Gathered& operator+=(const Gathered& o) {
         irradiance_lux += o.irradiance_lux;
-        moment_lux += o.moment_lux;
+        tilted_lux += o.tilted_lux;
         return *this;
     }
-    Gathered operator*(float s) const { return {irradiance_lux * s, moment_lux * s}; }
+    Gathered operator*(float s) const { return {irradiance_lux * s, tilted_lux * s}; }
 };
 
 struct GatherOptions {
