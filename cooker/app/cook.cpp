@@ -98,6 +98,9 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
+    c->add_flag_callback(
+        "--all-lights", [a] { a->options.light_grid = false; },
+        "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

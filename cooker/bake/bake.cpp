@@ -29,7 +29,8 @@ class Baker {
           progress_(progress),
           groups_(1 + static_cast<uint32_t>(rays.scene().light_sets.size())),
           emitters_(rays, meshGroups(rays.scene())),
-          gatherer_(rays, unwrap, texels, emitters_) {}
+          gatherer_(rays, unwrap, texels, emitters_),
+          grid_(rays, settings.light_grid) {}
 
     Baked run() {
         directPass();
@@ -71,7 +72,7 @@ class Baker {
             std::vector<ReceiverLight> stored_row;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                traced += directLight(rays_, unwrap_, texels_, i, sum, full) + options.rays;
+                traced += directLight(rays_, grid_, unwrap_, texels_, i, sum, full) + options.rays;
                 left_row.clear();
                 for (uint32_t g : sum.touched()) {
                     const glm::vec3 left = sum[g].irradiance_lux - full[g].irradiance_lux;
@@ -295,6 +296,7 @@ class Baker {
     uint32_t groups_;
     EmitterSampler emitters_;
     Gatherer gatherer_;
+    LightGrid grid_;
     std::vector<uint32_t> links_;  // series_rays per receiver
     SparseLight direct_, bounced_, radiance_;
     std::vector<float> least_;  // lux per group, empty before the first bounce
