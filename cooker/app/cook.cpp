@@ -107,7 +107,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"
-        "budget: exit code 3, nothing is written. Distances in levels are in metres, densities in texels per metre.\n"
+        "budget: exit code 3, nothing is written; Ctrl-C: 130, the old pack stays.\n"
+        "Distances in levels are in metres, densities in texels per metre.\n"
         "Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }

@@ -51,7 +51,7 @@ double candelaAt(const LightProfile& p, double vertical_deg, double horizontal_d
 // Float angles are good to 1e-5 degrees; values here change by at most a few candela per degree.
 constexpr double tolerance_cd = 1e-3;
 
-TEST(Ies, AllFiveHeaders) {
+TEST(SceneIesFile, AllFiveHeaders) {
     for (const char* header : {"", "my lamp\nsome label\n", "IESNA91\n[TEST] x\n", "IESNA:LM-63-1995\n[LUMCAT] y\n",
                                "IESNA:LM-63-2002\n[TEST] x\n[MORE] z\n", "IES:LM-63-2019\r\n[TESTLAB] x\r\n"}) {
         SCOPED_TRACE(header);
@@ -68,7 +68,7 @@ TEST(Ies, AllFiveHeaders) {
     }
 }
 
-TEST(Ies, FactorsMultiplyAndOutsideIsDark) {
+TEST(SceneIesFile, FactorsMultiplyAndOutsideIsDark) {
     Ies ies;
     ies.multiplier = 3;
     ies.ballast = 0.9;
@@ -82,7 +82,7 @@ TEST(Ies, FactorsMultiplyAndOutsideIsDark) {
     EXPECT_NEAR(candelaAt(parsed(ies.text()), 150, 0), 35 * 2.7, tolerance_cd);
 }
 
-TEST(Ies, LayoutIsFree) {
+TEST(SceneIesFile, LayoutIsFree) {
     Ies ies;
     ies.vertical = {0, 90};
     ies.candela = {100, 10};
@@ -100,7 +100,7 @@ struct Symmetry {
     double (*folded)(double);
 };
 
-TEST(Ies, SymmetriesUnfold) {
+TEST(SceneIesFile, SymmetriesUnfold) {
     const Symmetry symmetries[] = {
         {"around", {0}, [](double) { return 0.0; }},
         {"quadrants", {0, 30, 90}, [](double h) { return std::abs(std::remainder(h, 180.0)); }},
@@ -123,7 +123,7 @@ TEST(Ies, SymmetriesUnfold) {
 }
 
 // A full circle without its last column: from the last angle on to the first.
-TEST(Ies, AnOpenCircleIsClosed) {
+TEST(SceneIesFile, AnOpenCircleIsClosed) {
     Ies ies;
     ies.vertical = {0, 180};
     ies.horizontal = {0, 90, 180, 270};
@@ -134,7 +134,7 @@ TEST(Ies, AnOpenCircleIsClosed) {
 }
 
 // I = I0 cos: a flux of pi I0. Chords of the cosine over 5 degrees lie (5 degrees)^2 / 12 = 0.06 % below it on average.
-TEST(Ies, ALambertianProfileHasItsFlux) {
+TEST(SceneIesFile, ALambertianProfileHasItsFlux) {
     Ies ies;
     ies.vertical.clear();
     ies.candela.clear();
@@ -149,7 +149,7 @@ TEST(Ies, ALambertianProfileHasItsFlux) {
     EXPECT_NEAR(flux, 200 * M_PI, 0.001 * 200 * M_PI);
 }
 
-TEST(Ies, TiltIsReadPastAndSaidSo) {
+TEST(SceneIesFile, TiltIsReadPastAndSaidSo) {
     Ies ies;
     EXPECT_TRUE(parseLightProfile(ies.text(), "lamp.ies")->notes.empty());
     for (const char* tilt : {"TILT=INCLUDE\n1\n3\n0 90 180\n1 .9 .8\n", "TILT=lamp.tlt\n"}) {
@@ -162,7 +162,7 @@ TEST(Ies, TiltIsReadPastAndSaidSo) {
     }
 }
 
-TEST(Ies, BadFilesAreRefusedWithTheirLine) {
+TEST(SceneIesFile, BadFilesAreRefusedWithTheirLine) {
     struct Bad {
         const char* name;
         void (*apply)(Ies&);
@@ -219,7 +219,7 @@ TEST(Ies, BadFilesAreRefusedWithTheirLine) {
 }
 
 // Bytes changed, removed and cut off at random: a usable profile or a message with its place.
-TEST(Ies, DamagedFilesNeverCrash) {
+TEST(SceneIesFile, DamagedFilesNeverCrash) {
     std::mt19937 random(11);
     Ies ies;
     ies.tilt = "TILT=INCLUDE\n1\n2\n0 90\n1 .9\n";

@@ -52,7 +52,7 @@ std::string contentOf(const std::filesystem::path& path) {
     return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-TEST(SkyImage, Radiance) {
+TEST(SceneSkyImage, Radiance) {
     const TemporaryFolder folder;
     // 1 = 128 * 2^-7; the exponents tell the texels apart.
     const std::string file = radianceFile(2, 1, {{128, 64, 0, 129}, {128, 128, 128, 139}});
@@ -68,7 +68,7 @@ TEST(SkyImage, Radiance) {
     for (const glm::vec4& t : even->texels) EXPECT_EQ(glm::vec3(t), glm::vec3(2, 0.5f, 0.25f));
 }
 
-TEST(SkyImage, OpenExrWithAWindowOfItsOwn) {
+TEST(SceneSkyImage, OpenExrWithAWindowOfItsOwn) {
     const TemporaryFolder folder;
     std::vector<glm::vec4> texels;
     for (int i = 0; i < 12; ++i) texels.emplace_back(i, 100 * i, i == 5 ? -0.25f : 1e6f, 0);
@@ -83,7 +83,7 @@ TEST(SkyImage, OpenExrWithAWindowOfItsOwn) {
     }
 }
 
-TEST(SkyImage, InALevel) {
+TEST(SceneSkyImage, InALevel) {
     const TemporaryFolder folder;
     const std::string file = radianceFile(2, 1, {{128, 64, 0, 129}, {128, 128, 128, 139}});
     folder.write("sky.hdr", file.data(), file.size());
@@ -113,7 +113,7 @@ TEST(SkyImage, InALevel) {
     expectBadInput(import({{"dimmer_sky_image", "none.hdr"}}), {"scene", "none.hdr"});
 }
 
-TEST(SkyImage, BadFilesAreRefused) {
+TEST(SceneSkyImage, BadFilesAreRefused) {
     const TemporaryFolder folder;
     const auto refused = [&](const std::string& content, const char* message) {
         const auto image = readSkyImage(folder.write("sky.hdr", content.data(), content.size()));
@@ -134,7 +134,7 @@ TEST(SkyImage, BadFilesAreRefused) {
     refused(contentOf(folder.path / "nan.exr"), "NaN");
 }
 
-TEST(SkyImage, DamagedFilesNeverCrash) {
+TEST(SceneSkyImage, DamagedFilesNeverCrash) {
     const TemporaryFolder folder;
     std::vector<glm::vec4> texels(32 * 16);
     for (size_t i = 0; i < texels.size(); ++i) texels[i] = glm::vec4(static_cast<float>(i));
