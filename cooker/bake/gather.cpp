@@ -29,7 +29,7 @@ void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                       GroupAccumulator<Gathered>& sum, uint32_t* hits) const {
     const uint32_t seed = hash(options.seed, from.id);
-    const glm::vec3 sky = rays_.scene().sky_radiance_cd_m2;
+    const bool sky = rays_.scene().sky_radiance_cd_m2 != glm::vec3(0);
     const float lux_per_radiance = pi / static_cast<float>(options.rays);
     for (uint32_t i = 0; i < options.rays; ++i) {
         const uint32_t index = options.first_ray + i;
@@ -40,7 +40,7 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + index);
         if (hits) hits[i] = no_index;
         if (!hit) {
-            if (sky != glm::vec3(0)) sum[always_group].add(sky * lux_per_radiance, d);
+            if (sky) sum[always_group].add(missed(options, world, d.z) * lux_per_radiance, d);
             continue;
         }
         if (const Emitter* e = emitters_.emitterOf(hit->triangle); e && (!hit->back || e->double_sided)) {
@@ -57,6 +57,32 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         for (const GroupLight& light : outgoing->row(found)) sum[light.group].add(light.value * lux_per_radiance, d);
     }
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
+    if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
+}
+
+// The sky's radiance along a ray that hit nothing, times its share of the two ways to find it.
+glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const {
+    const glm::vec3 radiance = skyRadiance(rays_.scene(), world);
+    if (sky_.empty()) return radiance;
+    const float by_sky = static_cast<float>(options.emitter_samples) * sky_.pdf(radiance);
+    const float by_cosine = static_cast<float>(options.rays) * cos_surface / pi;
+    return radiance * (by_cosine / (by_cosine + by_sky));
+}
+
+void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const {
+    const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
+    for (uint32_t i = 0; i < options.emitter_samples; ++i) {
+        const uint32_t index = options.first_ray + i;
+        const SamplePoint& origin = from.points[index % from.points.size()];
+        const SkySample s = sky_.sample(sequence2d(index, seed));
+        const glm::vec3 d = toTangent(unwrap_.frames[origin.face], s.direction);
+        if (!(s.pdf > 0) || !(d.z > 0)) continue;
+        const float passed = rays_.transmittance(origin.position_m, s.direction, far_away_m);
+        if (!(passed > 0)) continue;
+        const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
+        const float by_cosine = static_cast<float>(options.rays) * d.z / pi;
+        sum[always_group].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
+    }
 }
 
 void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <bake/emitters.h>
+#include <bake/sky.h>
 #include <bake/sparse_light.h>
 #include <charts/texels.h>
 
@@ -33,7 +34,7 @@ struct Gathered {
 
 struct GatherOptions {
     uint32_t rays = 64;            // cosine-distributed, shared out among the texel's sample points
-    uint32_t emitter_samples = 4;  // towards each light group's emitters
+    uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
 };
@@ -48,11 +49,12 @@ struct GatherFrom {
 class Gatherer {
    public:
     Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters)
-        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters) {}
+        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), sky_(rays.scene()) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit. `hits`, when given, takes for every ray the receiver that it hit, or no_index.
-    // Unbiased: emitters are found by area and by hit, weighted by the balance heuristic (Veach 1995).
+    // Unbiased: emitters are found by area and by hit, an image sky by its own density and by miss, weighted by the
+    // balance heuristic (Veach 1995).
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                 GroupAccumulator<Gathered>& sum, uint32_t* hits) const;
 
@@ -65,12 +67,15 @@ class Gatherer {
     const Texels& texels() const { return texels_; }
 
    private:
+    glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const;
     void sampleEmitters(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+    void sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
 
     const RayScene& rays_;
     const Unwrap& unwrap_;
     const Texels& texels_;
     const EmitterSampler& emitters_;
+    SkySampler sky_;
 };
 
 }  // namespace dimmer::cook

@@ -2,6 +2,7 @@
 
 #include <bake/punctual.h>
 #include <bake/sampling.h>
+#include <bake/sky.h>
 
 #include <algorithm>
 #include <bit>
@@ -301,7 +302,7 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
         if (!(vertex.cosine(direction) > 0)) return sum;
         const auto hit = rays_.nearest(vertex.point, direction, far_m, path.nextBits());
-        if (!hit) return sum + throughput * scene.sky_radiance_cd_m2 * options_.always_weight;
+        if (!hit) return sum + throughput * skyRadiance(scene, direction) * options_.always_weight;
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
         if (hit->back && !scene.materials[triangle.material].double_sided) return sum;
         const float by_hit = d.z / pi, cos_there = std::abs(glm::dot(direction, triangle.normal));

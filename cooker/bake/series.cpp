@@ -20,6 +20,7 @@ class Expansion {
           texels_(gatherer.texels()),
           settings_(settings),
           progress_(progress),
+          grid_(gatherer.rays(), settings.light_grid),
           groups_(1 + static_cast<uint32_t>(gatherer.rays().scene().light_sets.size())) {}
 
     Series run() {
@@ -55,7 +56,8 @@ class Expansion {
             std::vector<ReceiverLight> stored_row;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                traced += directLight(gatherer_.rays(), gatherer_.unwrap(), texels_, i, sum, full) + options.rays;
+                traced +=
+                    directLight(gatherer_.rays(), grid_, gatherer_.unwrap(), texels_, i, sum, full) + options.rays;
                 left_row.clear();
                 for (uint32_t g : sum.touched()) {
                     const glm::vec3 left = sum[g].irradiance_lux - full[g].irradiance_lux;
@@ -210,6 +212,7 @@ class Expansion {
     const Texels& texels_;
     const BakeSettings& settings_;
     Progress& progress_;
+    LightGrid grid_;
     uint32_t groups_;
     std::vector<uint32_t> links_;  // series_rays per receiver
     std::vector<float> least_;     // lux per group, empty before the first bounce

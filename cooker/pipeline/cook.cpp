@@ -48,6 +48,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
             .bounces_max = quality.bounces,
             .tail_max = quality.tolerance,
             .threshold = profile.threshold,
+            .light_grid = quality.light_grid,
             .per_set_passes = quality.per_set_passes};
 }
 
@@ -141,8 +142,10 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
     auto profile = loadProfile(options.profile);
     if (!profile) return std::unexpected(profile.error());
-    for (Quality* quality : {&profile->draft, &profile->preview, &profile->final})
+    for (Quality* quality : {&profile->draft, &profile->preview, &profile->final}) {
         quality->per_set_passes = options.per_set_passes;
+        quality->light_grid = options.light_grid;
+    }
     CookResult result;
     Expected<Scene> scene;
     {

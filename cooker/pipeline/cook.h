@@ -20,6 +20,7 @@ struct CookOptions {
     std::string quality = "preview";
     uint32_t threads = 0;         // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
+    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
 };
 
 struct CookStats {

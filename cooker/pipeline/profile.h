@@ -20,6 +20,7 @@ struct Quality {
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
     bool per_set_passes = false;     // see BakeSettings; from the command line alone
+    bool light_grid = true;          // likewise
 };
 
 struct Profile {

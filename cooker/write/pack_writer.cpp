@@ -190,6 +190,7 @@ bool giveUsualRights(int file) {
 }
 
 Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    const std::scoped_lock lock(fileReplacement());
     std::string temporary = path.string() + ".XXXXXX";
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
@@ -206,6 +207,11 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
 
 std::vector<std::byte> packBytes(const PackData& data) {
     return Writer(data).write();
+}
+
+std::mutex& fileReplacement() {
+    static std::mutex mutex;
+    return mutex;
 }
 
 Expected<void> checkWritable(const std::filesystem::path& path) {
