@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 #include <dimmer/cpu_runtime.h>
 #include <format/texel.h>
+#include <pipeline/dissect.h>
 
 #include <fmt/format.h>
 
@@ -205,6 +206,24 @@ Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
                                                  scene.file));
 }
 
+Expected<void> dissect(const Scene& scene, const Pack& pack, const VerifyOptions& options, const ReferenceState& state,
+                       Progress& progress, VerifyReport& report) {
+    if (options.causes) {
+        if (std::ranges::find(state.door_open, true) != state.door_open.end())
+            return fail(ErrorCode::InvalidArgument, "Causes of error are told apart with closed doors only.");
+        const auto causes =
+            errorCauses(scene, pack, report.points, report.surface_pairs, state, report.floor_lux, progress);
+        if (!causes) return std::unexpected(causes.error());
+        report.causes.insert(causes->begin(), causes->end());
+    }
+    if (options.formats) {
+        auto formats = formatErrors(scene, pack, report.points, progress);
+        if (!formats) return std::unexpected(formats.error());
+        report.formats = std::move(*formats);
+    }
+    return {};
+}
+
 Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress,
                           VerifyReport& report) {
     // Each set is one that shines alone with every door closed: what the pack stores for it.
@@ -320,6 +339,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
     report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);
     report.causes["directional_model"] = modelError(at_surface, at_tilted, *floor_lux);
+    if (auto ok = dissect(scene, pack, options, *state, progress, report); !ok) return std::unexpected(ok.error());
     if (options.sets)
         if (auto ok = verifySets(scene, pack, options, progress, report); !ok) return std::unexpected(ok.error());
     progress.finish();
