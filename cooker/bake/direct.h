@@ -7,11 +7,6 @@
 
 namespace dimmer::cook {
 
-// The light group of everything that belongs to an optional light set.
-inline uint32_t groupOf(std::optional<uint32_t> light_set) {
-    return light_set ? 1 + *light_set : always_group;
-}
-
 // Adds the direct light at `receiver`: to `reflected` from every baked light (it is what bounces), to `stored` from
 // those with BakeMode::Full alone (a renderer draws the others itself). `grid` says which lights are worth asking.
 // Returns the shadow rays traced.

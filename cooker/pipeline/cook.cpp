@@ -124,6 +124,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         describeElements(scene, baked, pack, stats);
         std::vector<float> max_weights = {1};
         for (const SceneLightSet& set : scene.light_sets) max_weights.push_back(set.max_weight);
+        pack.color_format = profile.color_format;
+        pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, pack);
         pack.meshes = levelMeshes(*rays, charts);

@@ -1,7 +1,7 @@
 // A profile: the budgets, densities and qualities of a target platform.
 #pragma once
 
-#include <dimmer/error.h>
+#include <dimmer/pack.h>
 
 #include <cstdint>
 #include <map>
@@ -28,6 +28,8 @@ struct Profile {
     uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_per_element = 0;
     float texels_per_metre = 4;
     uint32_t page_size = 2048;
+    ColorFormat color_format = ColorFormat::E5B9G9R9;
+    DirectionModel direction_model = DirectionModel::Ahd;
     float threshold = 0.01f;  // activity, see BakeSettings
     Quality draft, preview, final;
 

@@ -142,7 +142,9 @@ class Writer {
                               .page_height = d_.page_height,
                               .page_count = d_.page_count,
                               .chunk_count = static_cast<uint32_t>(chunks_.size()),
-                              .reserved = {}};
+                              .color_format = static_cast<uint32_t>(d_.color_format),
+                              .direction_model = static_cast<uint32_t>(d_.direction_model),
+                              .reserved = 0};
         header.xxh64 = format::headerHash(header, std::as_bytes(std::span(chunks_)));
         std::vector<std::byte> file(end);
         std::memcpy(file.data(), &header, sizeof(header));

@@ -19,6 +19,7 @@ class GatherBlender : public TexelExecutor {
     TexelBuffer addresses_, base_, payload_, contributions_, first_record_, weights_;
     Kernel kernel_;
     uint32_t receivers_ = 0, groups_x_max_ = 0;
+    float weight_scale_ = 1;
 };
 
 // One pass per contribution over 32-bit sums; shaders/scatter_texels.comp.
@@ -38,6 +39,7 @@ class ScatterBlender : public TexelExecutor {
     Kernel kernel_;
     std::vector<Part> parts_;  // per contribution
     uint32_t receivers_ = 0, groups_x_max_ = 0;
+    float weight_scale_ = 1;
 };
 
 }  // namespace dimmer

@@ -93,8 +93,9 @@ std::vector<Run> recordRuns(const PackData& data, const Places& places) {
     return runs;
 }
 
-Specialisation specialisationOf(uint32_t group) {
-    return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size};
+Specialisation specialisationOf(uint32_t group, ColorFormat format) {
+    return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
+            static_cast<uint32_t>(format)};
 }
 
 // Pairs of receivers must not straddle batches.
@@ -118,7 +119,7 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
     blender.per_combination_ = per_combination;
     DIMMER_TRY(blender.createTables(vulkan, data, planner, transfer));
-    DIMMER_TRY(blender.createKernel(vulkan.device, planner, pages));
+    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, pages));
     return blender;
 }
 
@@ -142,9 +143,10 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),
                     base_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.records * sizeof(TexelRecord), wide_format,
-                                fillFrom(records, [&](uint32_t i) { return canonical(data.payload[i]); })),
-                    payload_));
+    DIMMER_TRY(
+        keep(uploadTable(vulkan, transfer, places.records * sizeof(TexelRecord), wide_format,
+                         fillFrom(records, [&](uint32_t i) { return canonical(data.color_format, data.payload[i]); })),
+             payload_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.first_records, VK_FORMAT_R32_UINT), first_records_));
     DIMMER_TRY(
@@ -153,11 +155,12 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
                 terms_);
 }
 
-Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planner, const LightmapPages& pages) {
+Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+                                          const LightmapPages& pages) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
-        pipelines.push_back(specialisationOf(group));
+        pipelines.push_back(specialisationOf(group, format));
     const KernelBinding bindings[] = {
         KernelBinding::ofTexels(addresses_.view.get()),       KernelBinding::ofTexels(base_.view.get()),
         KernelBinding::ofTexels(payload_.view.get()),         KernelBinding::ofTexels(work_.view.get()),

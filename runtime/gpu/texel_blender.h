@@ -21,7 +21,8 @@ class TexelBlender : public TexelExecutor {
    private:
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                 Transfer& transfer);
-    Expected<void> createKernel(VkDevice device, const Planner& planner, const LightmapPages& pages);
+    Expected<void> createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+                                const LightmapPages& pages);
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 

@@ -133,9 +133,10 @@ void Planner::collectClusters() {
 // Lists the cluster's terms that are on, and counts.
 Planner::Terms Planner::planCluster(const Cluster& cluster) {
     const auto first_term = static_cast<uint32_t>(terms_.size());
+    const float scale = weightScale(data_.color_format);
     for (uint32_t slot = 0; slot < cluster.term_count; ++slot) {
         const Weight& w = planned_[data_.terms[cluster.first_term + slot].contribution];
-        if (isOn(w)) terms_.push_back({slot, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale});
+        if (isOn(w)) terms_.push_back({slot, w.r * scale, w.g * scale, w.b * scale});
     }
     const uint32_t on = static_cast<uint32_t>(terms_.size()) - first_term;
     work_.groups[workGroupOf(on)].item_count += cluster.batch_count;
