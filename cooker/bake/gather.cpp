@@ -17,7 +17,7 @@ glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
 
 // Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
 uint32_t firstSample(const GatherOptions& options) {
-    return options.first_ray / options.rays * options.emitter_samples;
+    return options.first_ray / std::max(options.rays, 1u) * options.emitter_samples;
 }
 
 }  // namespace
