@@ -11,6 +11,7 @@ import os
 import pathlib
 import subprocess
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LEVELS = ROOT.parent / "shared/levels"
@@ -18,6 +19,8 @@ TRUTH = ROOT.parent / "shared/truth"
 PAGE = ROOT / "docs/measurements.md"
 DIMMER = str((ROOT / os.environ.get("DIMMER_BIN", "build/bin") / "dimmer").resolve())
 HOUSE = ROOT / "game_sample/levels/house.gltf"
+HOUSE_PROFILE = ROOT / "game_sample/house_profile.json"
+CAUSES = ["noise", "series_expansion", "texel_size", "activity_threshold", "colour_format", "directional_model"]
 NORMAL_MEAN, NORMAL_P95 = math.sqrt(2 / math.pi), 1.959964  # magnitude of a standard normal number
 
 
@@ -115,7 +118,9 @@ def pack_tables(levels, quality, folder):
     errors, effects = [], []
     for level in levels:
         pack = folder / f"{level}.dimmer"
+        started = time.monotonic()
         dimmer("cook", LEVELS / f"{level}.glb", "-o", pack, "--quality", quality)
+        print(f"{level}: cooked in {time.monotonic() - started:.1f} s", flush=True)
         states = {n: s for n, s in level_states(level).items() if "door:" not in s}
         truth = {n: read(TRUTH / f"{level}.surface.{n}.csv") for n in states}
         floor = 0.01 * sum(t for t, _ in truth["all_on"]) / len(truth["all_on"])
@@ -142,11 +147,11 @@ def pack_tables(levels, quality, folder):
 
 
 def verify_tables(levels, quality, points, paths, folder):
-    errors, effects = [], []
-    for name, level in levels:
+    errors, effects, causes, formats = [], [], [], []
+    for name, level, profile in levels:
         pack, report = folder / "verify.dimmer", folder / "verify.json"
-        dimmer("cook", level, "-o", pack, "--quality", quality)
-        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--json", report)
+        dimmer("cook", level, "-o", pack, "--quality", quality, "--profile", profile)
+        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--causes", "--formats", "--json", report)
         found = json.loads(report.read_text())
         for kind in ("surface", "tilted"):
             f = found[kind]
@@ -157,8 +162,16 @@ def verify_tables(levels, quality, points, paths, folder):
             effects.append([name, s["name"], percent(s["error"]), f"{100 * s['bias']:+.2f} %",
                             percent(s["reference_noise"]), str(s["points"]), percent(s["energy_dropped"])])
             print(*effects[-1], flush=True)
+        causes.append([name, *(percent(found["causes"][c]) for c in CAUSES)])
+        print(*causes[-1], flush=True)
+        for color, model in dict.fromkeys((f["color"], f["model"]) for f in found["formats"]):
+            cells = [f"{percent(f['mean'])}, {percent(f['p95'])}" for f in found["formats"]
+                     if (f["color"], f["model"]) == (color, model)]
+            formats.append([name, f"{color}, {model}", *cells])
     return (table(["level", "normals", "points", "mean", "95th percentile", "RMSE", "bias", "reference error"], errors),
-            table(["level", "light set", "error", "bias", "reference noise", "points", "energy dropped"], effects))
+            table(["level", "light set", "error", "bias", "reference noise", "points", "energy dropped"], effects),
+            table(["level", *(c.replace("_", " ") for c in CAUSES)], causes),
+            table(["level", "stored as", "1 set: mean, 95 %", "3 sets", "8 sets"], formats))
 
 
 def refresh(topic, text):
@@ -192,10 +205,11 @@ def main():
             refresh(f"packs {options.quality}", f"`scripts/bench bake --only packs --quality {options.quality}`\n\n"
                     f"{errors}\n\n{effects}")
         if options.only in (None, "verify"):
-            measured = [("house", HOUSE)] + [(n, LEVELS / f"{n}.glb") for n in levels if n == "two_rooms"]
-            errors, effects = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
+            measured = [("house", HOUSE, "desktop"), ("house, own profile", HOUSE, HOUSE_PROFILE)]
+            measured += [(n, LEVELS / f"{n}.glb", "desktop") for n in levels if n == "two_rooms"]
+            tables = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
             refresh(f"verify {options.quality}", f"`scripts/bench bake --only verify --quality {options.quality} "
-                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n{errors}\n\n{effects}")
+                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n" + "\n\n".join(tables))
 
 
 if __name__ == "__main__":
