@@ -47,7 +47,7 @@ class DoorPaths {
    public:
     explicit DoorPaths(const Scene& scene);
 
-    bool anyDoor() const { return condition_count_ > 0; }
+    uint32_t doorCount() const { return condition_count_ / 2; }
     // The first terms are the light groups over free paths, so that a term below groupCount() is its own group.
     const std::vector<Term>& terms() const { return terms_; }
     uint32_t termCount() const { return static_cast<uint32_t>(terms_.size()); }

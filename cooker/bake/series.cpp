@@ -6,6 +6,7 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 namespace dimmer::cook {
 namespace {
@@ -15,7 +16,31 @@ namespace {
 constexpr float lingering_share = 0.01f;
 // A term with doors need not be stored where it is this much fainter than what its light group's own threshold asks
 // for.
-constexpr float door_threshold_share = 0.1f;
+constexpr float door_threshold_share = 0.3f;
+
+// How much light there is around each door: over the receivers that see it, all terms together.
+class Surroundings {
+   public:
+    Surroundings(const DoorPaths& paths, const Sparse<uint32_t>& doors_seen)
+        : doors_seen_(doors_seen), sums_(paths.doorCount()), counts_(paths.doorCount()) {
+        for (size_t i = 0; i < doors_seen.rows(); ++i)
+            for (const uint32_t door : doors_seen.row(i)) ++counts_[door];
+    }
+    void add(size_t receiver, float lux) {
+        for (const uint32_t door : doors_seen_.row(receiver)) sums_[door] += static_cast<double>(lux);
+    }
+    // Around the darkest of a term's doors.
+    float mean(const Term& term) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (const auto* doors : {&term.doors_open, &term.doors_closed})
+            for (const uint32_t door : *doors) least = std::min(least, sums_[door] / std::max(counts_[door], 1.0));
+        return static_cast<float>(least);
+    }
+
+   private:
+    const Sparse<uint32_t>& doors_seen_;
+    std::vector<double> sums_, counts_;
+};
 
 class Expansion {
    public:
@@ -184,7 +209,9 @@ class Expansion {
     std::vector<TermReport> thresholds() const {
         std::vector<TermReport> reports(terms_);
         std::vector<double> sums(terms_);
+        Surroundings around(paths_, doors_seen_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
+            around.add(i, stored);
             const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
             if (!counts) return;
             ++reports[t].measured_over;
@@ -196,10 +223,9 @@ class Expansion {
             report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
             if (t == always_group) continue;
             report.threshold_lux = settings_.threshold * report.mean_lux;
-            const TermReport& group = reports[paths_.terms()[t].group];
-            if (t >= paths_.groupCount())
-                report.threshold_lux =
-                    std::max(report.threshold_lux, door_threshold_share * settings_.threshold * group.mean_lux);
+            if (t < paths_.groupCount()) continue;
+            const float near = std::max(reports[paths_.terms()[t].group].mean_lux, around.mean(paths_.terms()[t]));
+            report.threshold_lux = std::max(report.threshold_lux, door_threshold_share * settings_.threshold * near);
         }
         return reports;
     }

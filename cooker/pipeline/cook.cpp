@@ -8,6 +8,7 @@
 #include <encode/encode.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
+#include <scene/open_pose.h>
 #include <trace/ray_scene.h>
 #include <write/pack_writer.h>
 
@@ -120,6 +121,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Texels texels;
     {
         Stopwatch watch(stats, "charts");
+        addOpenLeaves(scene);
         cutAtWalls(scene, profile.texels_per_metre);
         rays.emplace(scene);
         progress.advance(1);

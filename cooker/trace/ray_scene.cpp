@@ -156,7 +156,7 @@ RayScene::RayScene(const Scene& scene) : scene_(scene) {
                                   .triangle = t,
                                   .material = mesh.triangle_materials[t],
                                   .normal = {},
-                                  .condition = mesh.door ? 2 * *mesh.door : no_condition});
+                                  .condition = mesh.door ? 2 * *mesh.door + mesh.is_open_leaf : no_condition});
             const glm::vec3 a = corner(level_triangle, 0), b = corner(level_triangle, 1), c = corner(level_triangle, 2);
             triangles_.back().normal = glm::normalize(glm::cross(b - a, c - a));
             bounds_min_ = glm::min(bounds_min_, glm::min(a, glm::min(b, c)));
