@@ -27,7 +27,7 @@ struct Level {
     Texels texels;
     SparseLight outgoing;
     std::unique_ptr<EmitterSampler> emitters;
-    uint32_t groups = 1;
+    std::unique_ptr<DoorPaths> paths;
 
     Level() {
         const char* named = std::getenv("DIMMER_BENCH_LEVEL");
@@ -38,13 +38,13 @@ struct Level {
         rays = std::make_unique<RayScene>(scene);
         charts = *unwrap(*rays, {texels_per_metre, 2048});
         texels = sampleTexels(*rays, charts, 8);
-        groups = 1 + static_cast<uint32_t>(scene.light_sets.size());
+        paths = std::make_unique<DoorPaths>(scene);
         std::vector<uint32_t> mesh_groups(scene.meshes.size(), always_group);
         emitters = std::make_unique<EmitterSampler>(*rays, mesh_groups);
         // One group everywhere: the least that a gather must look up at a hit.
         outgoing = SparseLight::build(texels.size(), [](size_t begin, size_t end, auto emit) {
-            const GroupLight one{always_group, glm::vec3(1)};
-            for (size_t i = begin; i < end; ++i) emit(std::span<const GroupLight>(&one, 1));
+            const TermLight one{always_group, glm::vec3(1)};
+            for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>(&one, 1));
         });
     }
 };
@@ -110,13 +110,13 @@ BENCHMARK(bareEmbree)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 void finalGather(benchmark::State& state) {
     const Level& l = level();
-    const Gatherer gatherer(*l.rays, l.charts, l.texels, *l.emitters);
-    const std::vector<float> floors(l.groups, 0.0f);
+    const Gatherer gatherer(*l.rays, l.charts, l.texels, *l.emitters, *l.paths);
+    const std::vector<float> floors(l.paths->termCount(), 0.0f);
     const FinalGatherOptions options{
         .rays_max = rays_per_texel, .emitter_samples = 0, .noise_max = 0, .seed = 1, .floor_lux = floors};
     for (auto _ : state)
         forEachBlock(l.texels.size(), [&](size_t begin, size_t end) {
-            FinalGather gather(gatherer, l.groups);
+            FinalGather gather(gatherer);
             std::vector<ReceiverLight> row;
             for (size_t i = begin; i < end; ++i) {
                 row.clear();

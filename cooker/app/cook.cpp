@@ -39,7 +39,7 @@ void printTable(const CookResult& result, const PackCost& cost, const Profile& p
     for (const ElementCost& e : cost.elements) {
         float dropped = 0;
         for (const Contribution& c : pack.contributions)
-            if (c.light_set == e.element) dropped = c.energy_dropped;
+            if (c.light_set == e.element && c.doors_open.empty() && c.doors_closed.empty()) dropped = c.energy_dropped;
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n",
                    (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
                    humanBytes(e.bytes), e.receivers, 100 * static_cast<double>(dropped));

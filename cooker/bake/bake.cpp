@@ -17,17 +17,16 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
-        FinalGather gather(gatherer, static_cast<uint32_t>(series.groups.size()));
+        FinalGather gather(gatherer);
         std::vector<ReceiverLight> row;
-        std::vector<uint32_t> groups;
+        std::vector<uint32_t> terms;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
-            series.activeGroups(i, groups);
+            series.activeTerms(i, terms);
             row.clear();
-            if (!settings.per_set_passes)
-                traced += gather.gather(gatherer.at(i), groups, series.radiance, options, row);
-            for (size_t g = 0; settings.per_set_passes && g < groups.size(); ++g)
-                traced += gather.gather(gatherer.at(i), {&groups[g], 1}, series.radiance, options, row);
+            if (!settings.per_set_passes) traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row);
+            for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
+                traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
             emit(std::span<const ReceiverLight>(row));
         }
         all_traced += traced;
@@ -46,7 +45,7 @@ Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sp
             row.assign(indirect.begin(), indirect.end());
             for (const ReceiverLight& d : direct.row(i))
                 for (ReceiverLight& l : row)
-                    if (l.group == d.group) l.light += d.light;
+                    if (l.term == d.term) l.light += d.light;
             emit(std::span<const ReceiverLight>(row));
         }
     });
@@ -57,12 +56,14 @@ Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sp
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
            Progress& progress) {
     const EmitterSampler emitters(rays, meshGroups(rays.scene()));
-    const Gatherer gatherer(rays, unwrap, texels, emitters);
+    const DoorPaths paths(rays.scene());
+    const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
     Series series = expandSeries(gatherer, settings, progress);
     Baked out;
     out.rays = series.rays;
     out.light = gatherAll(gatherer, series, settings, progress, out.rays);
-    out.groups = std::move(series.groups);
+    out.terms = paths.terms();
+    out.reports = std::move(series.reports);
     out.bounces = series.bounces;
     out.warnings = std::move(series.warnings);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
@@ -70,7 +71,7 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
     if (settings.denoise) out.light = denoise(unwrap, texels, std::move(out.light), progress);
     out.light = withDirect(out.light, direct);
     for (size_t i = 0; i < texels.size(); ++i)
-        for (const ReceiverLight& l : out.light.row(i)) ++out.groups[l.group].receivers;
+        for (const ReceiverLight& l : out.light.row(i)) ++out.reports[l.term].receivers;
     return out;
 }
 

@@ -1,4 +1,4 @@
-// From charts to light: what every light group adds at every receiver.
+// From charts to light: what every term (light group and door states) adds at every receiver.
 #pragma once
 
 #include <bake/gather.h>
@@ -12,40 +12,43 @@ namespace dimmer::cook {
 
 struct BakeSettings {
     uint32_t series_rays = 32;     // per texel, for the bounces; kept as 4-byte links while the series runs
-    uint32_t final_rays = 128;     // per texel and light group at most, for what is stored
+    uint32_t final_rays = 128;     // per texel and term at most, for what is stored
     uint32_t emitter_samples = 8;  // per series_rays or round of final rays, towards each light group's emitters
-    float noise_max = 0;   // a light group's rays at a texel end when the 95 % interval is within this share; 0: never
-    bool denoise = false;  // filter what noise is left, in lightmap space
+    float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
+    bool denoise = false;          // filter what noise is left, in lightmap space
     uint32_t bounces_max = 64;
     float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
-    float threshold = 0.01f;  // activity, as a share of a set's mean indirect irradiance where it lights directly
+    float threshold = 0.01f;  // activity, as a share of a term's mean; see TermReport
     uint32_t seed = 1;
     // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
     bool light_grid = true;
-    // The final gather once per light group, as bakers do that know nothing of sharing rays: the same result, for
+    // The final gather once per term, as bakers do that know nothing of sharing rays: the same result, for
     // measuring against.
     bool per_set_passes = false;
 };
 
-// What is stored for one (receiver, group).
+// What is stored for one (receiver, term).
 struct ReceiverLight {
-    uint32_t group = 0;
+    uint32_t term = 0;
     Gathered light;
     float variance = 0;  // of the luminance of the irradiance, lux^2; Monte Carlo noise alone
 };
 
-struct GroupReport {
+// Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
+// the receivers that see one of the doors, by what is stored.
+struct TermReport {
     uint64_t receivers = 0;  // active ones
-    uint64_t lit_directly = 0;
-    float mean_indirect_lux = 0;  // luminance, over the receivers that the group lights directly
+    uint64_t measured_over = 0;
+    float mean_lux = 0;  // luminance
     float threshold_lux = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
     double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1
 };
 
 struct Baked {
-    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active sets
-    std::vector<GroupReport> groups;  // always, then each light set
+    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
+    std::vector<Term> terms;          // as DoorPaths lists them
+    std::vector<TermReport> reports;  // per term
     uint32_t bounces = 0;
     uint64_t rays = 0;
     std::vector<std::string> warnings;

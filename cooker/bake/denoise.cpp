@@ -42,7 +42,7 @@ class LightmapFilter {
         }
     }
 
-    // Replaces each variance by the mean over the neighbours of the same group.
+    // Replaces each variance by the mean over the neighbours of the same term.
     void smoothVariance(size_t receiver, std::vector<ReceiverLight>& row) const {
         const uint32_t address = texels_.address[receiver];
         const Chart& chart = chartOf(receiver);
@@ -88,13 +88,13 @@ class LightmapFilter {
         return unwrap_.charts[unwrap_.face_chart[texels_.sample(receiver, 0).face]];
     }
 
-    // visit(index in `here`, entry of `other`) for the groups that both hold; both ascend by group.
+    // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
     static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {
         size_t j = 0;
         for (size_t i = 0; i < here.size(); ++i) {
-            while (j < other.size() && other[j].group < here[i].group) ++j;
+            while (j < other.size() && other[j].term < here[i].term) ++j;
             if (j == other.size()) return;
-            if (other[j].group == here[i].group) visit(i, other[j]);
+            if (other[j].term == here[i].term) visit(i, other[j]);
         }
     }
 

@@ -1,5 +1,6 @@
 #include <bake/direct.h>
 
+#include <bake/door_rays.h>
 #include <bake/punctual.h>
 #include <bake/sampling.h>
 
@@ -15,8 +16,12 @@ constexpr float sun_distance_m = 1e30f;
 
 }  // namespace
 
-uint64_t directLight(const RayScene& rays, const LightGrid& grid, const Unwrap& unwrap, const Texels& texels,
-                     size_t receiver, GroupAccumulator<Gathered>& reflected, GroupAccumulator<Gathered>& stored) {
+uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, size_t receiver,
+                     TermAccumulator<Gathered>& reflected, TermAccumulator<Gathered>& stored) {
+    const RayScene& rays = gatherer.rays();
+    const Texels& texels = gatherer.texels();
+    const DoorPaths& paths = gatherer.paths();
+    const uint32_t own = gatherer.conditionOf(receiver);
     const auto seed = static_cast<uint32_t>(receiver);
     const uint32_t points = texels.sampleCount(receiver);
     const glm::vec3 place = texels.sample(receiver, 0).position_m;
@@ -28,20 +33,21 @@ uint64_t directLight(const RayScene& rays, const LightGrid& grid, const Unwrap& 
         const uint32_t used = near ? points : 1;
         for (uint32_t i = 0; i < used; ++i) {
             const SamplePoint& p = texels.sample(receiver, (first + i) % points);
-            const TangentFrame& frame = unwrap.frames[p.face];
+            const TangentFrame& frame = gatherer.unwrap().frames[p.face];
             const Illumination lit = illuminate(light, p.position_m);
             const float cos_surface = glm::dot(frame.normal, lit.towards_light);
             if (!(cos_surface > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
             ++traced;
-            const float passed = rays.transmittance(p.position_m, lit.towards_light,
-                                                    std::isinf(lit.distance_m) ? sun_distance_m : lit.distance_m);
-            if (!(passed > 0)) continue;
-            const glm::vec3 lux = lit.irradiance_lux * (cos_surface * passed / static_cast<float>(used));
+            const float distance_m = std::isinf(lit.distance_m) ? sun_distance_m : lit.distance_m;
             const glm::vec3 direction(glm::dot(lit.towards_light, frame.tangent),
                                       glm::dot(lit.towards_light, frame.bitangent), cos_surface);
-            const uint32_t group = groupOf(light.light_set);
-            reflected[group].add(lux, direction);
-            if (light.bake == BakeMode::Full) stored[group].add(lux, direction);
+            forEachWay(rays, paths, own, p.position_m, lit.towards_light, distance_m, [&](float passed, uint32_t path) {
+                const uint32_t term = paths.term(groupOf(light.light_set), path);
+                if (term == no_term) return;
+                const glm::vec3 lux = lit.irradiance_lux * (cos_surface * passed / static_cast<float>(used));
+                reflected[term].add(lux, direction);
+                if (light.bake == BakeMode::Full) stored[term].add(lux, direction);
+            });
         }
     });
     return traced;

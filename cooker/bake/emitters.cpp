@@ -136,7 +136,7 @@ EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, f
     float cos_emitter = -glm::dot(direction, e.normal);
     if (e.double_sided) cos_emitter = std::abs(cos_emitter);
     if (!(cos_emitter > 0)) return {};
-    return {direction, distance, e.radiance_cd_m2, it->probability * distance2 / (e.area_m2 * cos_emitter)};
+    return {direction, distance, e.radiance_cd_m2, e.triangle, it->probability * distance2 / (e.area_m2 * cos_emitter)};
 }
 
 const Emitter* EmitterSampler::emitterOf(uint32_t triangle) const {

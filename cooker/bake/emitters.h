@@ -28,6 +28,7 @@ struct EmitterSample {
     glm::vec3 direction;  // unit
     float distance_m;
     glm::vec3 radiance_cd_m2;
+    uint32_t triangle;
     float pdf;  // per steradian; 0: nothing to see
 };
 

@@ -11,14 +11,14 @@ namespace {
 // Fewer rounds say too little about their spread to stop on it.
 constexpr uint32_t rounds_min = 4;
 constexpr float normal_95 = 1.96f;
-// Light below this share of its group's mean need not be exact to a share of itself: the error metric's own floor.
+// Light below this share of its term's mean need not be exact to a share of itself: the error metric's own floor.
 constexpr float noise_floor = 0.01f;
 
 }  // namespace
 
 std::vector<float> noiseFloors(const Series& series) {
     std::vector<float> floors;
-    for (const GroupReport& g : series.groups) floors.push_back(noise_floor * g.mean_indirect_lux);
+    for (const TermReport& r : series.reports) floors.push_back(noise_floor * r.mean_lux);
     return floors;
 }
 
@@ -42,11 +42,11 @@ float FinalGather::State::varianceOfMean() const {
     return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
 }
 
-uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> groups, const SparseLight& outgoing,
+uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
                              const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
-    for (uint32_t g : groups) state_[g] = {};
+    for (uint32_t t : terms) state_[t] = {};
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
-    size_t waiting = groups.size();
+    size_t waiting = terms.size();
     uint64_t traced = 0;
     for (uint32_t r = 0; r < rounds_max && waiting > 0; ++r) {
         gatherer_.gather(from,
@@ -56,20 +56,20 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> g
                           .first_ray = r * rays_per_round},
                          &outgoing, round_, nullptr);
         traced += rays_per_round;
-        for (uint32_t g : groups) {
-            State& s = state_[g];
+        for (uint32_t t : terms) {
+            State& s = state_[t];
             if (s.done) continue;
-            s.add(round_[g]);
+            s.add(round_[t]);
             const float interval = normal_95 * std::sqrt(s.varianceOfMean());
             s.done = r + 1 >= rounds_min && options.noise_max > 0 &&
-                     interval <= options.noise_max * (s.mean + options.floor_lux[g]);
+                     interval <= options.noise_max * (s.mean + options.floor_lux[t]);
             waiting -= s.done;
         }
         round_.clear();
     }
-    for (uint32_t g : groups) {
-        const State& s = state_[g];
-        out.push_back({g, s.sum * (1 / static_cast<float>(s.rounds)), s.varianceOfMean()});
+    for (uint32_t t : terms) {
+        const State& s = state_[t];
+        out.push_back({t, s.sum * (1 / static_cast<float>(s.rounds)), s.varianceOfMean()});
     }
     return traced;
 }

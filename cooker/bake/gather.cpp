@@ -1,5 +1,6 @@
 #include <bake/gather.h>
 
+#include <bake/door_rays.h>
 #include <bake/sampling.h>
 
 #include <algorithm>
@@ -31,8 +32,19 @@ void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
     tilted_lux += luminance(lux) * glm::max(glm::vec4(slope, -slope) + tilt_cos, 0.0f);
 }
 
+struct Gatherer::Ray {
+    const GatherFrom& from;
+    const GatherOptions& options;
+    const SparseLight* outgoing;
+    TermAccumulator<Gathered>& sum;
+    GatherLinks* links;
+    uint32_t i;  // in this gather
+    glm::vec3 origin, world, tangent;
+    float lux_per_radiance;
+};
+
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                      GroupAccumulator<Gathered>& sum, uint32_t* hits) const {
+                      TermAccumulator<Gathered>& sum, GatherLinks* links) const {
     const uint32_t seed = hash(options.seed, from.id);
     const bool sky = rays_.scene().sky_radiance_cd_m2 != glm::vec3(0);
     const float lux_per_radiance = pi / static_cast<float>(options.rays);
@@ -42,27 +54,63 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         const TangentFrame& frame = unwrap_.frames[origin.face];
         const glm::vec3 d = cosineDirection(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + index);
-        if (hits) hits[i] = no_index;
-        if (!hit) {
-            if (sky) sum[always_group].add(missed(options, world, d.z) * lux_per_radiance, d);
-            continue;
+        const Ray ray{from, options, outgoing, sum, links, i, origin.position_m, world, d, lux_per_radiance};
+        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + index, Surfaces::Walls);
+        if (links) links->hits[i] = no_index;
+        const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
+        if (path == no_path) continue;
+        if (hit) {
+            take(ray, *hit, path);
+        } else if (const uint32_t term = paths_.term(always_group, path); sky && term != no_term) {
+            sum[term].add(missed(options, world, d.z) * lux_per_radiance, d);
         }
-        if (const Emitter* e = emitters_.emitterOf(hit->triangle); e && (!hit->back || e->double_sided)) {
-            const float cos_emitter = std::abs(glm::dot(world, e->normal));
-            const float by_area = static_cast<float>(options.emitter_samples) *
-                                  emitters_.pdf(emitters_.cellAt(origin.position_m), *e, hit->distance_m, cos_emitter);
-            const float by_hit = static_cast<float>(options.rays) * d.z / pi;
-            sum[e->group].add(e->radiance_cd_m2 * (lux_per_radiance * by_hit / (by_hit + by_area)), d);
-        }
-        const uint32_t found = receiverOf(unwrap_, texels_, *hit);
-        if (found == no_index) continue;
-        if (hits) hits[i] = found;
-        if (!outgoing) continue;
-        for (const GroupLight& light : outgoing->row(found)) sum[light.group].add(light.value * lux_per_radiance, d);
     }
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
     if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
+}
+
+// Takes what the leaves along a ray send back. Returns the path on which it goes on behind them.
+uint32_t Gatherer::throughLeaves(const Ray& ray, float distance_m) const {
+    uint32_t path = free_path;
+    for (const Hit& hit : rays_.leavesAlong(ray.origin, ray.world, distance_m)) {
+        const uint32_t condition = rays_.triangles()[hit.triangle].condition;
+        const Leaf leaf = paths_.leaf(path, ray.from.condition, condition);
+        if (leaf == Leaf::Absent) continue;
+        const float stopped = rays_.alphaAt(hit.triangle, hit.u, hit.v);
+        const uint32_t chance = hash(hash(ray.options.seed, ray.from.id), ray.options.first_ray + ray.i);
+        if (stopped < 1 && unitFloat(hash(chance, hit.triangle)) >= stopped) continue;
+        if (ray.links) ray.links->doors.push_back(condition / 2);
+        if (leaf == Leaf::There) {
+            take(ray, hit, path);
+            return no_path;
+        }
+        if (const uint32_t reflecting = paths_.with(path, condition); reflecting != no_path) take(ray, hit, reflecting);
+        path = paths_.with(path, condition ^ 1);
+        if (path == no_path) return no_path;
+    }
+    return path;
+}
+
+// Takes the light of the surface at a ray's end.
+void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
+    if (const Emitter* e = emitters_.emitterOf(hit.triangle); e && (!hit.back || e->double_sided)) {
+        const float cos_emitter = std::abs(glm::dot(ray.world, e->normal));
+        const float by_area = static_cast<float>(ray.options.emitter_samples) *
+                              emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
+        const float by_hit = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
+        if (const uint32_t term = paths_.term(e->group, path); term != no_term)
+            ray.sum[term].add(e->radiance_cd_m2 * (ray.lux_per_radiance * by_hit / (by_hit + by_area)), ray.tangent);
+    }
+    const uint32_t found = receiverOf(unwrap_, texels_, hit);
+    if (found == no_index) return;
+    if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
+    if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
+    if (!ray.outgoing) return;
+    const bool as_it_is = path == free_path && ray.from.condition == no_condition;
+    for (const TermLight& light : ray.outgoing->row(found)) {
+        const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
+        if (term != no_term) ray.sum[term].add(light.value * ray.lux_per_radiance, ray.tangent);
+    }
 }
 
 // The sky's radiance along a ray that hit nothing, times its share of the two ways to find it.
@@ -74,7 +122,7 @@ glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float 
     return radiance * (by_cosine / (by_cosine + by_sky));
 }
 
-void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const {
+void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const {
     const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;
@@ -82,16 +130,32 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, G
         const SkySample s = sky_.sample(sequence2d(index, seed));
         const glm::vec3 d = toTangent(unwrap_.frames[origin.face], s.direction);
         if (!(s.pdf > 0) || !(d.z > 0)) continue;
-        const float passed = rays_.transmittance(origin.position_m, s.direction, far_away_m);
-        if (!(passed > 0)) continue;
         const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
         const float by_cosine = static_cast<float>(options.rays) * d.z / pi;
-        sum[always_group].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
+        forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, far_away_m,
+                   [&](float passed, uint32_t path) {
+                       if (const uint32_t term = paths_.term(always_group, path); term != no_term)
+                           sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
+                   });
     }
 }
 
+// The path of light that starts on a surface which is there under `target`.
+uint32_t Gatherer::onto(uint32_t path, uint32_t own, uint32_t target) const {
+    if (target == no_condition) return path;
+    switch (paths_.leaf(path, own, target)) {
+        case Leaf::Absent:
+            return no_path;
+        case Leaf::There:
+            return path;
+        case Leaf::Either:
+            return paths_.with(path, target);
+    }
+    return no_path;
+}
+
 void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,
-                              GroupAccumulator<Gathered>& sum) const {
+                              TermAccumulator<Gathered>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
     const uint32_t any_point = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
@@ -106,8 +170,13 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             const glm::vec3 d = toTangent(frame, s.direction);
             if (!(s.pdf > 0) || !(d.z > 0)) continue;
             const float by_area = samples * s.pdf, by_hit = static_cast<float>(options.rays) * d.z / pi;
-            const float passed = rays_.transmittance(origin.position_m, s.direction, s.distance_m * shadow_end_share);
-            if (passed > 0) sum[range.group].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
+            const uint32_t target = rays_.triangles()[s.triangle].condition;
+            forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, s.distance_m * shadow_end_share,
+                       [&](float passed, uint32_t path) {
+                           const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
+                           if (term != no_term)
+                               sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
+                       });
         }
     }
 }

@@ -1,5 +1,6 @@
-// One gather of the light that arrives at a receiver, shared by every light group: what a ray hits does not depend on
-// which light is asked about, so each ray is traced once and brings home the light of all groups found at its end.
+// One gather of the light that arrives at a receiver, shared by every term: what a ray hits does not depend on which
+// light is asked about, so each ray is traced once and brings home the light of all terms found at its end. A ray that
+// meets a door's leaf ends there and goes on as well, so that one ray serves the open and the closed door.
 #pragma once
 
 #include <bake/emitters.h>
@@ -9,14 +10,16 @@
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
+#include <vector>
 
 namespace dimmer::cook {
 
 // The tilt of Gathered's four normals: cosine and sine. The mean cosine of all normals within 60 degrees.
 inline constexpr float tilt_cos = 0.75f, tilt_sin = 0.66143783f;
 
-// Light of one group at one receiver.
+// Light of one term at one receiver.
 struct Gathered {
     glm::vec3 irradiance_lux{0};
     // Luminance of the irradiance on normals tilted towards +tangent, +bitangent, -tangent and -bitangent: how
@@ -43,38 +46,63 @@ struct GatherOptions {
 struct GatherFrom {
     std::span<const SamplePoint> points;
     uint32_t id = 0;
+    uint32_t condition = no_condition;  // under which the receiver is there: a leaf's
+};
+
+// What the rays of a gather found, for going there again.
+struct GatherLinks {
+    struct ThroughDoors {
+        uint32_t receiver;
+        uint32_t path;
+    };
+    std::span<uint32_t> hits;                 // per ray: the receiver that it hit over the free path, or no_index
+    std::vector<ThroughDoors> through_doors;  // over all other paths
+    std::vector<uint32_t> doors;              // that rays met, once for each ray
 };
 
 // Thread-safe: gather() only reads.
 class Gatherer {
    public:
-    Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters)
-        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), sky_(rays.scene()) {}
+    Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters,
+             const DoorPaths& paths)
+        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), paths_(paths), sky_(rays.scene()) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
-    // receivers that rays hit. `hits`, when given, takes for every ray the receiver that it hit, or no_index.
+    // receivers that rays hit. `links`, when given, takes where the rays ended.
     // Unbiased: emitters are found by area and by hit, an image sky by its own density and by miss, weighted by the
     // balance heuristic (Veach 1995).
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                GroupAccumulator<Gathered>& sum, uint32_t* hits) const;
+                TermAccumulator<Gathered>& sum, GatherLinks* links) const;
 
     GatherFrom at(size_t receiver) const {
-        return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)}, static_cast<uint32_t>(receiver)};
+        return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
+                static_cast<uint32_t>(receiver),
+                conditionOf(receiver)};
+    }
+    // no_condition but for the texels of doors' leaves.
+    uint32_t conditionOf(size_t receiver) const {
+        return rays_.triangles()[unwrap_.faces[texels_.sample(receiver, 0).face].triangle].condition;
     }
 
     const RayScene& rays() const { return rays_; }
     const Unwrap& unwrap() const { return unwrap_; }
     const Texels& texels() const { return texels_; }
+    const DoorPaths& paths() const { return paths_; }
 
    private:
+    struct Ray;
+    uint32_t throughLeaves(const Ray& ray, float distance_m) const;
+    void take(const Ray& ray, const Hit& hit, uint32_t path) const;
+    uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
     glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const;
-    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
-    void sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const;
+    void sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const;
 
     const RayScene& rays_;
     const Unwrap& unwrap_;
     const Texels& texels_;
     const EmitterSampler& emitters_;
+    const DoorPaths& paths_;
     SkySampler sky_;
 };
 

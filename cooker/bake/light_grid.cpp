@@ -79,8 +79,9 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
     const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));
     std::vector<uint8_t> marks(cellCount());
     for (uint32_t i = 0; i < light_probe_rays; ++i) {
+        // Through doors: what is behind them is lit once they open.
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
-        const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i));
+        const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i), Surfaces::Walls);
         const float stop_m = hit ? hit->distance_m : far_m;
         for (float m = 0; m < stop_m; m += step_share * cell_m_)
             markAround(light.position_m + d * m, spread * m, marks);

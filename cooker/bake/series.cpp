@@ -4,7 +4,9 @@
 #include <bake/sampling.h>
 
 #include <atomic>
+#include <bit>
 #include <cmath>
+#include <limits>
 
 namespace dimmer::cook {
 namespace {
@@ -12,6 +14,33 @@ namespace {
 // Bounced light of a set below this share of its activity threshold does not bounce on: with the usual threshold of
 // 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss.
 constexpr float lingering_share = 0.01f;
+// A term with doors need not be stored where it is this much fainter than what its light group's own threshold asks
+// for.
+constexpr float door_threshold_share = 0.3f;
+
+// How much light there is around each door: over the receivers that see it, all terms together.
+class Surroundings {
+   public:
+    Surroundings(const DoorPaths& paths, const Sparse<uint32_t>& doors_seen)
+        : doors_seen_(doors_seen), sums_(paths.doorCount()), counts_(paths.doorCount()) {
+        for (size_t i = 0; i < doors_seen.rows(); ++i)
+            for (const uint32_t door : doors_seen.row(i)) ++counts_[door];
+    }
+    void add(size_t receiver, float lux) {
+        for (const uint32_t door : doors_seen_.row(receiver)) sums_[door] += static_cast<double>(lux);
+    }
+    // Around the darkest of a term's doors.
+    float mean(const Term& term) const {
+        double least = std::numeric_limits<double>::infinity();
+        for (const auto* doors : {&term.doors_open, &term.doors_closed})
+            for (const uint32_t door : *doors) least = std::min(least, sums_[door] / std::max(counts_[door], 1.0));
+        return static_cast<float>(least);
+    }
+
+   private:
+    const Sparse<uint32_t>& doors_seen_;
+    std::vector<double> sums_, counts_;
+};
 
 class Expansion {
    public:
@@ -21,7 +50,8 @@ class Expansion {
           settings_(settings),
           progress_(progress),
           grid_(gatherer.rays(), settings.light_grid),
-          groups_(1 + static_cast<uint32_t>(gatherer.rays().scene().light_sets.size())) {}
+          paths_(gatherer.paths()),
+          terms_(paths_.termCount()) {}
 
     Series run() {
         directPass();
@@ -32,12 +62,12 @@ class Expansion {
     }
 
    private:
-    // Moves `sum` to a row. `least`, when not empty, leaves out what is fainter than that, per group.
-    static void takeRow(GroupAccumulator<Gathered>& sum, std::span<const float> least, std::vector<GroupLight>& row) {
+    // Moves `sum` to a row. `least`, when not empty, leaves out what is fainter than that, per term.
+    static void takeRow(TermAccumulator<Gathered>& sum, std::span<const float> least, std::vector<TermLight>& row) {
         row.clear();
-        for (uint32_t g : sum.touched())
-            if (least.empty() || luminance(sum[g].irradiance_lux) >= least[g])
-                row.push_back({g, sum[g].irradiance_lux});
+        for (uint32_t t : sum.touched())
+            if (least.empty() || luminance(sum[t].irradiance_lux) >= least[t])
+                row.push_back({t, sum[t].irradiance_lux});
         sum.clear();
     }
 
@@ -50,24 +80,31 @@ class Expansion {
             .rays = settings_.series_rays, .emitter_samples = settings_.emitter_samples, .seed = settings_.seed};
         SparseLight::Builder direct(texels_.size()), left_to_renderer(texels_.size());
         Sparse<ReceiverLight>::Builder stored(texels_.size());
+        Sparse<GatherLinks::ThroughDoors>::Builder door_links(texels_.size());
+        Sparse<uint32_t>::Builder doors_seen(texels_.size());
         forEachBlock(texels_.size(), [&](size_t begin, size_t end) {
-            GroupAccumulator<Gathered> sum(groups_), full(groups_);
-            std::vector<GroupLight> row, left_row;
+            TermAccumulator<Gathered> sum(terms_), full(terms_);
+            std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
+            GatherLinks links;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                traced +=
-                    directLight(gatherer_.rays(), grid_, gatherer_.unwrap(), texels_, i, sum, full) + options.rays;
+                traced += directLight(gatherer_, grid_, i, sum, full) + options.rays;
                 left_row.clear();
-                for (uint32_t g : sum.touched()) {
-                    const glm::vec3 left = sum[g].irradiance_lux - full[g].irradiance_lux;
-                    if (luminance(left) > 0) left_row.push_back({g, left});
+                for (uint32_t t : sum.touched()) {
+                    const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;
+                    if (luminance(left) > 0) left_row.push_back({t, left});
                 }
                 stored_row.clear();
-                for (uint32_t g : full.touched())
-                    if (luminance(full[g].irradiance_lux) > 0) stored_row.push_back({g, full[g]});
+                for (uint32_t t : full.touched())
+                    if (luminance(full[t].irradiance_lux) > 0) stored_row.push_back({t, full[t]});
                 full.clear();
-                gatherer_.gather(gatherer_.at(i), options, nullptr, sum, &links_[i * settings_.series_rays]);
+                links = {{&links_[i * settings_.series_rays], settings_.series_rays}, {}, {}};
+                gatherer_.gather(gatherer_.at(i), options, nullptr, sum, &links);
+                std::ranges::sort(links.doors);
+                links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
+                door_links.put(i, links.through_doors);
+                doors_seen.put(i, links.doors);
                 takeRow(sum, {}, row);
                 direct.put(i, row);
                 left_to_renderer.put(i, left_row);
@@ -76,6 +113,8 @@ class Expansion {
             rays_traced_ += traced;
             progress_.advance(end - begin);
         });
+        door_links_ = door_links.finish();
+        doors_seen_ = doors_seen.finish();
         out_.direct = direct.finish();
         out_.left_to_renderer = left_to_renderer.finish();
         out_.stored_direct = stored.finish();
@@ -84,14 +123,17 @@ class Expansion {
     // What leaves each receiver: rho / pi * (direct + bounced so far).
     SparseLight outgoing(const SparseLight& bounced) const {
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            GroupAccumulator<Gathered> sum(groups_);
-            std::vector<GroupLight> row;
+            TermAccumulator<Gathered> sum(terms_);
+            std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
                 const glm::vec3 reflect = texels_.reflectance[i] / pi;
+                const uint32_t own = gatherer_.conditionOf(i);
                 for (const auto* part : {&out_.direct, &bounced})
-                    for (const GroupLight& l : part->row(i)) sum[l.group].irradiance_lux += reflect * l.value;
+                    for (const TermLight& l : part->row(i))
+                        if (const uint32_t term = paths_.leaving(l.term, own); term != no_term)
+                            sum[term].irradiance_lux += reflect * l.value;
                 takeRow(sum, {}, row);
-                emit(std::span<const GroupLight>(row));
+                emit(std::span<const TermLight>(row));
             }
         });
     }
@@ -100,17 +142,24 @@ class Expansion {
     SparseLight follow(const SparseLight& radiance) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            GroupAccumulator<Gathered> sum(groups_);
-            std::vector<GroupLight> row;
+            TermAccumulator<Gathered> sum(terms_);
+            std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
+                const uint32_t own = gatherer_.conditionOf(i);
                 for (uint32_t r = 0; r < settings_.series_rays; ++r) {
                     const uint32_t from = links_[i * settings_.series_rays + r];
                     if (from == no_index) continue;
-                    for (const GroupLight& l : radiance.row(from))
-                        sum[l.group].irradiance_lux += lux_per_radiance * l.value;
+                    for (const TermLight& l : radiance.row(from))
+                        if (const uint32_t term = own == no_condition ? l.term : paths_.moved(l.term, free_path, own);
+                            term != no_term)
+                            sum[term].irradiance_lux += lux_per_radiance * l.value;
                 }
+                for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
+                    for (const TermLight& l : radiance.row(link.receiver))
+                        if (const uint32_t term = paths_.moved(l.term, link.path, own); term != no_term)
+                            sum[term].irradiance_lux += lux_per_radiance * l.value;
                 takeRow(sum, least_, row);
-                emit(std::span<const GroupLight>(row));
+                emit(std::span<const TermLight>(row));
             }
         });
     }
@@ -118,8 +167,7 @@ class Expansion {
     double flux(const SparseLight& light) const {
         double sum = 0;
         for (size_t i = 0; i < light.rows(); ++i)
-            for (const GroupLight& l : light.row(i))
-                sum += static_cast<double>(texels_.area_m2[i] * luminance(l.value));
+            for (const TermLight& l : light.row(i)) sum += static_cast<double>(texels_.area_m2[i] * luminance(l.value));
         return sum;
     }
 
@@ -127,12 +175,12 @@ class Expansion {
     void bounce() {
         progress_.stage("bounces", settings_.bounces_max);
         out_.bounced = SparseLight::build(texels_.size(), [](size_t begin, size_t end, auto emit) {
-            for (size_t i = begin; i < end; ++i) emit(std::span<const GroupLight>{});
+            for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
         });
         double sum = 0, last = 0;
         for (out_.bounces = 0; out_.bounces < settings_.bounces_max; ++out_.bounces) {
             out_.bounced = follow(outgoing(out_.bounced));
-            if (least_.empty()) decideLeast();
+            decideLeast();
             progress_.advance(1);
             const double now = flux(out_.bounced), step = now - sum;
             const double q = last > 0 ? step / last : 1;
@@ -143,67 +191,86 @@ class Expansion {
         if (out_.bounces == settings_.bounces_max)
             out_.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
         links_ = {};
+        door_links_ = {};
         out_.radiance = outgoing(out_.bounced);
     }
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every
-    // set would linger everywhere at a millionth of a lux.
+    // set would linger everywhere at a millionth of a lux. Light through several doors takes several bounces to appear.
     void decideLeast() {
-        const std::vector<GroupReport> first_bounce = thresholds();
-        least_.resize(groups_);
-        for (uint32_t g = 0; g < groups_; ++g) least_[g] = lingering_share * first_bounce[g].threshold_lux;
+        const bool first = least_.empty();
+        if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(out_.bounces + 1))) return;
+        const std::vector<TermReport> reports = thresholds();
+        least_.resize(terms_);
+        for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
+            least_[t] = lingering_share * reports[t].threshold_lux;
     }
 
-    std::vector<GroupReport> thresholds() const {
-        std::vector<GroupReport> reports(groups_);
-        std::vector<double> indirect(groups_);
-        forEachPair([&](size_t, uint32_t group, float direct, float bounced, float) {
-            if (direct <= 0) return;
-            ++reports[group].lit_directly;
-            indirect[group] += static_cast<double>(bounced);
+    std::vector<TermReport> thresholds() const {
+        std::vector<TermReport> reports(terms_);
+        std::vector<double> sums(terms_);
+        Surroundings around(paths_, doors_seen_);
+        forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
+            around.add(i, stored);
+            const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
+            if (!counts) return;
+            ++reports[t].measured_over;
+            sums[t] += static_cast<double>(t < paths_.groupCount() ? bounced : stored);
         });
-        for (uint32_t g = 0; g < groups_; ++g) {
-            GroupReport& report = reports[g];
-            if (report.lit_directly == 0) continue;
-            report.mean_indirect_lux = static_cast<float>(indirect[g] / static_cast<double>(report.lit_directly));
-            if (g != always_group) report.threshold_lux = settings_.threshold * report.mean_indirect_lux;
+        for (uint32_t t = 0; t < terms_; ++t) {
+            TermReport& report = reports[t];
+            if (report.measured_over == 0) continue;
+            report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
+            if (t == always_group) continue;
+            report.threshold_lux = settings_.threshold * report.mean_lux;
+            if (t < paths_.groupCount()) continue;
+            const float near = std::max(reports[paths_.terms()[t].group].mean_lux, around.mean(paths_.terms()[t]));
+            report.threshold_lux = std::max(report.threshold_lux, door_threshold_share * settings_.threshold * near);
         }
         return reports;
     }
 
-    void decideActivity() {
-        out_.groups = thresholds();
-        std::vector<double> dropped(groups_);
-        forEachPair([&](size_t i, uint32_t group, float direct, float bounced, float stored) {
-            const double energy = static_cast<double>(texels_.area_m2[i] * stored);
-            out_.groups[group].energy += energy;
-            if (!out_.active(group, direct, bounced)) dropped[group] += energy;
-        });
-        for (uint32_t g = 0; g < groups_; ++g)
-            if (out_.groups[g].energy > 0) out_.groups[g].energy_dropped = dropped[g] / out_.groups[g].energy;
+    bool seesDoorOf(size_t receiver, uint32_t term) const {
+        const auto of_term = [&](uint32_t door) {
+            const Term& t = paths_.terms()[term];
+            return std::ranges::binary_search(t.doors_open, door) || std::ranges::binary_search(t.doors_closed, door);
+        };
+        return std::ranges::any_of(doors_seen_.row(receiver), of_term);
     }
 
-    // visit(receiver, group, direct, bounced, storable), luminances in lux, for every pair that has light. Storable is
+    void decideActivity() {
+        out_.reports = thresholds();
+        std::vector<double> dropped(terms_);
+        forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
+            const double energy = static_cast<double>(texels_.area_m2[i] * stored);
+            out_.reports[t].energy += energy;
+            if (!out_.active(t, direct, bounced)) dropped[t] += energy;
+        });
+        for (uint32_t t = 0; t < terms_; ++t)
+            if (out_.reports[t].energy > 0) out_.reports[t].energy_dropped = dropped[t] / out_.reports[t].energy;
+    }
+
+    // visit(receiver, term, direct, bounced, storable), luminances in lux, for every pair that has light. Storable is
     // all of it but the direct light of lamps that a renderer draws itself.
     void forEachPair(auto&& visit) const {
-        std::vector<float> direct(groups_), bounced(groups_), left_out(groups_);
+        std::vector<float> direct(terms_), bounced(terms_), left_out(terms_);
         std::vector<uint32_t> here;
         for (size_t i = 0; i < texels_.size(); ++i) {
             here.clear();
-            for (const GroupLight& l : out_.direct.row(i)) {
-                direct[l.group] = luminance(l.value);
-                here.push_back(l.group);
+            for (const TermLight& l : out_.direct.row(i)) {
+                direct[l.term] = luminance(l.value);
+                here.push_back(l.term);
             }
-            for (const GroupLight& l : out_.bounced.row(i)) {
-                bounced[l.group] = luminance(l.value);
-                here.push_back(l.group);
+            for (const TermLight& l : out_.bounced.row(i)) {
+                bounced[l.term] = luminance(l.value);
+                here.push_back(l.term);
             }
-            for (const GroupLight& l : out_.left_to_renderer.row(i)) left_out[l.group] = luminance(l.value);
+            for (const TermLight& l : out_.left_to_renderer.row(i)) left_out[l.term] = luminance(l.value);
             std::ranges::sort(here);
             here.erase(std::unique(here.begin(), here.end()), here.end());
-            for (uint32_t g : here) {
-                visit(i, g, direct[g], bounced[g], std::max(0.0f, direct[g] - left_out[g]) + bounced[g]);
-                direct[g] = bounced[g] = left_out[g] = 0;
+            for (uint32_t t : here) {
+                visit(i, t, direct[t], bounced[t], std::max(0.0f, direct[t] - left_out[t]) + bounced[t]);
+                direct[t] = bounced[t] = left_out[t] = 0;
             }
         }
     }
@@ -213,29 +280,32 @@ class Expansion {
     const BakeSettings& settings_;
     Progress& progress_;
     LightGrid grid_;
-    uint32_t groups_;
+    const DoorPaths& paths_;
+    uint32_t terms_;
     std::vector<uint32_t> links_;  // series_rays per receiver
-    std::vector<float> least_;     // lux per group, empty before the first bounce
+    Sparse<GatherLinks::ThroughDoors> door_links_;
+    Sparse<uint32_t> doors_seen_;
+    std::vector<float> least_;  // lux per term, empty before the first bounce
     std::atomic<uint64_t> rays_traced_ = 0;
     Series out_;
 };
 
 }  // namespace
 
-bool Series::active(uint32_t group, float direct_lux, float bounced_lux) const {
-    const float threshold = groups[group].threshold_lux;
-    return group == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
+bool Series::active(uint32_t term, float direct_lux, float bounced_lux) const {
+    const float threshold = reports[term].threshold_lux;
+    return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
            (bounced_lux > 0 && bounced_lux >= threshold);
 }
 
-void Series::activeGroups(size_t receiver, std::vector<uint32_t>& active_groups) const {
-    active_groups.assign(1, always_group);
-    for (const GroupLight& l : direct.row(receiver))
-        if (l.group != always_group && active(l.group, luminance(l.value), 0)) active_groups.push_back(l.group);
-    for (const GroupLight& l : bounced.row(receiver))
-        if (l.group != always_group && active(l.group, 0, luminance(l.value))) active_groups.push_back(l.group);
-    std::ranges::sort(active_groups);
-    active_groups.erase(std::unique(active_groups.begin(), active_groups.end()), active_groups.end());
+void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
+    terms.assign(1, always_group);
+    for (const TermLight& l : direct.row(receiver))
+        if (l.term != always_group && active(l.term, luminance(l.value), 0)) terms.push_back(l.term);
+    for (const TermLight& l : bounced.row(receiver))
+        if (l.term != always_group && active(l.term, 0, luminance(l.value))) terms.push_back(l.term);
+    std::ranges::sort(terms);
+    terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
 }
 
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress) {

@@ -15,16 +15,16 @@ struct Series {
     SparseLight left_to_renderer;         // the part of `direct` that renderers draw themselves and no pack stores
     Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
     SparseLight radiance;                 // what leaves each receiver, cd/m2
-    std::vector<GroupReport> groups;
+    std::vector<TermReport> reports;      // per term
     uint32_t bounces = 0;
     uint64_t rays = 0;
     std::vector<std::string> warnings;
 
     // Lit directly counts once it matters as much as the threshold asks of indirect light: a lamp without range lights
     // everything in sight a little.
-    bool active(uint32_t group, float direct_lux, float bounced_lux) const;
-    // Ascending: always-on light, then the sets that are active at the receiver.
-    void activeGroups(size_t receiver, std::vector<uint32_t>& groups) const;
+    bool active(uint32_t term, float direct_lux, float bounced_lux) const;
+    // Ascending: always-on light over free paths, then what is active at the receiver.
+    void activeTerms(size_t receiver, std::vector<uint32_t>& terms) const;
 };
 
 // Deterministic for any number of threads. Memory while it runs: 4 bytes * series_rays per texel.

@@ -1,26 +1,20 @@
-// Light per receiver and light group, stored only where there is some.
+// Light per receiver and term (bake/door_paths.h), stored only where there is some.
 #pragma once
+
+#include <bake/door_paths.h>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
-#include <optional>
 #include <span>
 #include <vector>
 
 namespace dimmer::cook {
 
-// Light group 0 is all always-on light; group 1 + s is light set s.
-inline constexpr uint32_t always_group = 0;
-// The group of what belongs to an optional light set.
-inline uint32_t groupOf(std::optional<uint32_t> light_set) {
-    return light_set ? 1 + *light_set : always_group;
-}
-
-struct GroupLight {
-    uint32_t group = 0;
+struct TermLight {
+    uint32_t term = 0;
     glm::vec3 value{0};  // irradiance in lux, or radiance in cd/m2, by context
 };
 
@@ -37,7 +31,7 @@ void forEachBlock(size_t rows, Visit&& visit) {
                       [&](size_t b) { visit(b * rows_per_block, std::min(rows, (b + 1) * rows_per_block)); });
 }
 
-// Compressed rows: row i holds the groups that reach receiver i, ascending.
+// Compressed rows: row i holds the terms that reach receiver i, ascending.
 template <class Entry>
 class Sparse {
    public:
@@ -92,30 +86,30 @@ class Sparse {
     std::vector<Entry> entries_;
 };
 
-using SparseLight = Sparse<GroupLight>;
+using SparseLight = Sparse<TermLight>;
 
-// One worker's dense scratch over groups, emptied in time proportional to what was touched.
+// One worker's dense scratch over terms, emptied in time proportional to what was touched.
 template <class Value>
-class GroupAccumulator {
+class TermAccumulator {
    public:
-    explicit GroupAccumulator(uint32_t groups) : values_(groups), used_(groups) {}
+    explicit TermAccumulator(uint32_t terms) : values_(terms), used_(terms) {}
 
-    Value& operator[](uint32_t group) {
-        if (!used_[group]) {
-            used_[group] = 1;
-            touched_.push_back(group);
+    Value& operator[](uint32_t term) {
+        if (!used_[term]) {
+            used_[term] = 1;
+            touched_.push_back(term);
         }
-        return values_[group];
+        return values_[term];
     }
-    // Groups touched since the last clear, ascending.
+    // Terms touched since the last clear, ascending.
     std::span<const uint32_t> touched() {
         std::ranges::sort(touched_);
         return touched_;
     }
     void clear() {
-        for (uint32_t g : touched_) {
-            values_[g] = Value{};
-            used_[g] = 0;
+        for (uint32_t t : touched_) {
+            values_[t] = Value{};
+            used_[t] = 0;
         }
         touched_.clear();
     }

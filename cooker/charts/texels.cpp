@@ -95,6 +95,8 @@ class TexelSampler {
             centroid = {c.face, weightsAt(c.face, mean(polygon))};
         }
         if (usable.tried == 0 && largest > 0) tryPoint(centroid, usable, result);
+        // All of it lies in a closed door's leaf: what an opening uncovers.
+        if (result.points.empty()) result.points = std::move(usable.in_leaf);
         if (usable.tried > 0) result.reflectance /= static_cast<float>(usable.tried);
         if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(result.points);
         return result;
@@ -121,6 +123,7 @@ class TexelSampler {
 
     struct Usable {
         uint32_t tried = 0, dropped = 0;
+        std::vector<SamplePoint> in_leaf;  // of the dropped ones
     };
 
     void tryPoint(const SurfacePoint& s, Usable& usable, Result& result) const {
@@ -131,22 +134,27 @@ class TexelSampler {
         result.reflectance +=
             rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
         ++usable.tried;
-        if (insideGeometry(position, s.face))
-            ++usable.dropped;
-        else
+        if (!insideGeometry(position, s.face, Surfaces::All)) {
             result.points.push_back({position, s.face});
+            return;
+        }
+        ++usable.dropped;
+        const bool on_leaf = rays_.triangles()[triangle].condition != no_condition;
+        if (rays_.anyLeaf() && !on_leaf && usable.in_leaf.size() < samples_max_ &&
+            !insideGeometry(position, s.face, Surfaces::Walls))
+            usable.in_leaf.push_back({position, s.face});
     }
 
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
     // none; more than one, because where solids touch, a ray may as well report the neighbour's front.
-    bool insideGeometry(glm::vec3 position, uint32_t face) const {
+    bool insideGeometry(glm::vec3 position, uint32_t face, Surfaces surfaces) const {
         const TangentFrame& f = unwrap_.frames[face];
         uint32_t backs = 0;
         for (uint32_t i = 0; i < inside_test_rays; ++i) {
             if (i == inside_test_rays / 4 && backs == 0) return false;
             const glm::vec3 d = cosineDirection(sequence2d(i, face));
             const glm::vec3 direction = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
-            const auto hit = rays_.nearest(position, direction, 1e30f, 0);
+            const auto hit = rays_.nearest(position, direction, 1e30f, 0, surfaces);
             backs += hit && hit->back && !doubleSided(hit->triangle);
         }
         return 2 * backs > inside_test_rays;

@@ -36,7 +36,8 @@ struct Texels {
 };
 
 // Up to `samples_max` points per texel, Halton-distributed over what the charts cover of it. Points inside closed
-// geometry are dropped, and so are points that a wall parts from the texel's others. Deterministic.
+// geometry are dropped, and so are points that a wall parts from the texel's others; where all lie inside a closed
+// door's leaf, they stay: an opening uncovers them. Deterministic.
 Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max);
 
 // Which receiver a ray's hit reads; no_index for surfaces that receive no light.

@@ -53,7 +53,8 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
 
 }  // namespace
 
-void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
+void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
+                   PackData& pack) {
     const std::vector<Target> targets = listTargets(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
@@ -62,10 +63,10 @@ void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
     for (uint32_t t = 0; t < targets.size(); ++t) {
         signature.clear();
         for (const ReceiverLight& l : baked.light.row(targets[t].source)) {
-            if (l.group == always_group)
+            if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
             else
-                signature.push_back(l.group - 1);
+                signature.push_back(contribution_of_term[l.term]);
         }
         if (!signature.empty()) members[signature].push_back(t);
     }
@@ -80,7 +81,8 @@ void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
         for (uint32_t t : cluster->second) {
             pack.addresses.push_back(targets[t].address);
             for (const ReceiverLight& l : baked.light.row(targets[t].source))
-                if (l.group != always_group) payloads[l.group - 1].push_back(encodeTexel(l.light, encoding));
+                if (l.term != always_group)
+                    payloads[contribution_of_term[l.term]].push_back(encodeTexel(l.light, encoding));
         }
         appendCluster(cluster->first, static_cast<uint32_t>(cluster->second.size()), pack);
     }

@@ -96,7 +96,7 @@ float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
     float largest = 0;
     for (size_t i = 0; i < baked.light.rows(); ++i) {
         glm::vec3 sum(0);
-        for (const ReceiverLight& l : baked.light.row(i)) sum += max_weights[l.group] * l.light.irradiance_lux;
+        for (const ReceiverLight& l : baked.light.row(i)) sum += max_weights[l.term] * l.light.irradiance_lux;
         largest = std::max({largest, sum.x, sum.y, sum.z});
     }
     if (!(largest > 0) || !std::isfinite(largest)) return 1;

@@ -8,6 +8,7 @@
 #include <encode/encode.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
+#include <scene/open_pose.h>
 #include <trace/ray_scene.h>
 #include <write/pack_writer.h>
 
@@ -39,22 +40,49 @@ uint64_t peakBytes() {
     return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-// Elements and contributions: one contribution per light set, until doors have their own.
-void describeElements(const Scene& scene, const Baked& baked, PackData& pack, CookStats& stats) {
+void describeElements(const Scene& scene, PackData& pack) {
     for (const SceneLightSet& set : scene.light_sets)
         pack.elements.push_back({set.name, ElementKind::LightSet, set.max_weight});
     for (const SceneDoor& door : scene.doors) pack.elements.push_back({door.name, ElementKind::Door, 1});
-    for (uint32_t s = 0; s < scene.light_sets.size(); ++s) {
-        const GroupReport& report = baked.groups[1 + s];
-        pack.contributions.push_back({.light_set = s,
-                                      .doors_open = {},
-                                      .doors_closed = {},
+}
+
+// One contribution per light set, and one per term with doors that some receiver has. Returns them by term.
+std::vector<uint32_t> describeContributions(const Scene& scene, const Baked& baked, PackData& pack) {
+    const auto first_door = static_cast<uint32_t>(scene.light_sets.size());
+    const auto elements = [&](std::vector<uint32_t> doors) {
+        for (uint32_t& door : doors) door += first_door;
+        return doors;
+    };
+    std::vector<uint32_t> contribution_of_term(baked.terms.size(), no_index);
+    for (uint32_t t = always_group + 1; t < baked.terms.size(); ++t) {
+        const Term& term = baked.terms[t];
+        if (!term.free() && baked.reports[t].receivers == 0) continue;
+        contribution_of_term[t] = static_cast<uint32_t>(pack.contributions.size());
+        pack.contributions.push_back({.light_set = {},
+                                      .doors_open = elements(term.doors_open),
+                                      .doors_closed = elements(term.doors_closed),
                                       .receivers = 0,
-                                      .energy_dropped = static_cast<float>(report.energy_dropped)});
-        if (report.receivers == 0)
-            stats.warnings.push_back(fmt::format("{}: light set '{}' reaches no surface; it is kept, and does nothing",
-                                                 scene.file, scene.light_sets[s].name));
+                                      .energy_dropped = static_cast<float>(baked.reports[t].energy_dropped)});
+        if (term.group != always_group) pack.contributions.back().light_set = term.group - 1;
     }
+    return contribution_of_term;
+}
+
+void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats) {
+    std::vector<bool> used(scene.doors.size());
+    for (uint32_t t = 0; t < baked.terms.size(); ++t) {
+        const Term& term = baked.terms[t];
+        if (baked.reports[t].receivers > 0)
+            for (const auto* doors : {&term.doors_open, &term.doors_closed})
+                for (const uint32_t door : *doors) used[door] = true;
+        else if (term.free() && term.group != always_group)
+            stats.warnings.push_back(fmt::format("{}: light set '{}' reaches no surface; it is kept, and does nothing",
+                                                 scene.file, scene.light_sets[term.group - 1].name));
+    }
+    for (uint32_t d = 0; d < used.size(); ++d)
+        if (!used[d])
+            stats.warnings.push_back(fmt::format("{}: door '{}' changes no light; it is kept, and does nothing",
+                                                 scene.file, scene.doors[d].name));
 }
 
 void describePlaces(const Scene& scene, PackData& pack) {
@@ -93,6 +121,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Texels texels;
     {
         Stopwatch watch(stats, "charts");
+        addOpenLeaves(scene);
         cutAtWalls(scene, profile.texels_per_metre);
         rays.emplace(scene);
         progress.advance(1);
@@ -121,13 +150,16 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.page_width = charts.page_width;
         pack.page_height = charts.page_height;
         pack.page_count = charts.page_count;
-        describeElements(scene, baked, pack, stats);
-        std::vector<float> max_weights = {1};
-        for (const SceneLightSet& set : scene.light_sets) max_weights.push_back(set.max_weight);
+        describeElements(scene, pack);
+        const std::vector<uint32_t> contribution_of_term = describeContributions(scene, baked, pack);
+        warnOfIdleElements(scene, baked, stats);
+        std::vector<float> max_weights;
+        for (const Term& term : baked.terms)
+            max_weights.push_back(term.group == always_group ? 1 : scene.light_sets[term.group - 1].max_weight);
         pack.color_format = profile.color_format;
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
-        buildClusters(texels, baked, pack);
+        buildClusters(texels, baked, contribution_of_term, pack);
         pack.meshes = levelMeshes(*rays, charts);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);

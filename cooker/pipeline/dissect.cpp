@@ -34,6 +34,7 @@ struct Rebake {
     Unwrap charts;
     Texels texels;
     std::optional<EmitterSampler> emitters;
+    std::optional<DoorPaths> paths;
     std::optional<Gatherer> gatherer;
     BakeSettings settings;
     Series series;
@@ -55,7 +56,8 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
         return fail(ErrorCode::BadInput, "the pack's pages are not those of this level; cook the level again");
     bake->texels = sampleTexels(*bake->rays, bake->charts, quality.samples_per_texel);
     bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
-    bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters);
+    bake->paths.emplace(bake->scene);
+    bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
     bake->settings = bakeSettings(settings->profile, quality);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
@@ -99,18 +101,20 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
     return out;
 }
 
-// Luminance of groups' light in a state of the sets, and the variance of what was gathered.
+// Luminance of terms' light in a state of the sets with every door closed, and the variance of what was gathered.
 class Mixed {
    public:
-    explicit Mixed(const ReferenceState& state) {
-        weights_.emplace_back(1.0f);
-        weights_.insert(weights_.end(), state.set_weights.begin(), state.set_weights.end());
+    Mixed(const DoorPaths& paths, const ReferenceState& state) {
+        for (const Term& t : paths.terms()) {
+            const glm::vec3 lit = t.group == always_group ? glm::vec3(1) : state.set_weights[t.group - 1];
+            weights_.push_back(t.doors_open.empty() ? lit : glm::vec3(0));
+        }
     }
-    double lux(uint32_t group, const Gathered& light) const {
-        return static_cast<double>(luminance(weights_[group] * light.irradiance_lux));
+    double lux(uint32_t term, const Gathered& light) const {
+        return static_cast<double>(luminance(weights_[term] * light.irradiance_lux));
     }
     double variance(const ReceiverLight& l) const {
-        const auto w = static_cast<double>(luminance(weights_[l.group]));
+        const auto w = static_cast<double>(luminance(weights_[l.term]));
         return w * w * static_cast<double>(l.variance);
     }
 
@@ -124,14 +128,14 @@ struct Steps {
 };
 
 Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const LightPair& pair, const Mixed& mixed) {
-    const auto group_count = static_cast<uint32_t>(bake.series.groups.size());
-    const std::vector<float> floors(group_count);
+    const uint32_t term_count = bake.paths->termCount();
+    const std::vector<float> floors(term_count);
     FinalGatherOptions options = finalGatherOptions(bake.settings, floors);
     options.noise_max = 0;
     options.seed = gather_seed;
-    std::vector<uint32_t> all(group_count), active;
+    std::vector<uint32_t> all(term_count), active;
     std::iota(all.begin(), all.end(), 0u);
-    FinalGather gather(*bake.gatherer, group_count);
+    FinalGather gather(*bake.gatherer);
     std::vector<ReceiverLight> row;
 
     const Footprint footprint = footprintOf(bake, pack, p);
@@ -142,26 +146,28 @@ Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const 
     for (const auto& [receiver, share] : footprint.parts) {
         row.clear();
         gather.gather(bake.gatherer->at(receiver), all, bake.series.radiance, options, row);
-        bake.series.activeGroups(receiver, active);
+        bake.series.activeTerms(receiver, active);
         const auto weight = static_cast<double>(share);
         shares += weight;
         for (const ReceiverLight& l : row) {
-            const double lux = weight * mixed.lux(l.group, l.light);
+            const double lux = weight * mixed.lux(l.term, l.light);
             at_texels += lux;
-            if (std::ranges::binary_search(active, l.group)) where_active += lux;
+            if (std::ranges::binary_search(active, l.term)) where_active += lux;
             texel_variance += weight * weight * mixed.variance(l);
         }
         for (const ReceiverLight& d : bake.series.stored_direct.row(receiver))
-            direct += weight * mixed.lux(d.group, d.light);
+            direct += weight * mixed.lux(d.term, d.light);
     }
     at_texels /= shares, where_active /= shares, direct /= shares, texel_variance /= shares * shares;
     row.clear();
     options.rays_max = 2 * many_rays;
-    gather.gather({{&*footprint.centre, 1}, hash(gather_seed, footprint.parts[0].receiver)}, all, bake.series.radiance,
-                  options, row);
+    const GatherFrom centre{{&*footprint.centre, 1},
+                            hash(gather_seed, footprint.parts[0].receiver),
+                            bake.gatherer->conditionOf(footprint.parts[0].receiver)};
+    gather.gather(centre, all, bake.series.radiance, options, row);
     double at_point = 0, point_variance = 0;
     for (const ReceiverLight& l : row) {
-        at_point += mixed.lux(l.group, l.light);
+        at_point += mixed.lux(l.term, l.light);
         point_variance += mixed.variance(l);
     }
     const double point_error = std::sqrt(point_variance), texel_error = std::sqrt(texel_variance);
@@ -189,7 +195,7 @@ double meanStep(std::span<const Steps> steps, LightPair Steps::*step, std::span<
     return count > 0 ? std::sqrt(std::max(0.0, sum * sum - noise * noise)) / count : 0;
 }
 
-// What arrives at a point, per light group, with the irradiance on tilted normals beside.
+// What arrives at a point, per light group with doors closed, with the irradiance on tilted normals beside.
 struct Falloff {
     Gathered light;
     std::array<glm::vec3, tilted_count> tilted_lux{};
@@ -215,7 +221,7 @@ std::vector<glm::vec3> tiltedNormals(uint32_t point) {
 
 // A plain gather: emitters by hit alone.
 void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std::span<const glm::vec3> normals,
-                   GroupAccumulator<Falloff>& sum) {
+                   TermAccumulator<Falloff>& sum) {
     const TangentFrame& frame = bake.charts.frames[from.face];
     const float lux_per_radiance = pi / (2 * many_rays);
     for (uint32_t i = 0; i < 2 * many_rays; ++i) {
@@ -231,8 +237,9 @@ void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std
             sum[e->group].add(lux_per_radiance * e->radiance_cd_m2, d, normals);
         const uint32_t found = receiverOf(bake.charts, bake.texels, *hit);
         if (found == no_index) continue;
-        for (const GroupLight& l : bake.series.radiance.row(found))
-            sum[l.group].add(lux_per_radiance * l.value, d, normals);
+        for (const TermLight& l : bake.series.radiance.row(found))
+            if (const Term& term = bake.paths->terms()[l.term]; term.doors_open.empty())
+                sum[term.group].add(lux_per_radiance * l.value, d, normals);
     }
 }
 
@@ -256,7 +263,7 @@ double decodedLux(const TexelRecord& record, const TexelEncoding& encoding, glm:
 }
 
 // The base, then the sets that give most light, at most `sets` of them.
-std::vector<uint32_t> strongest(GroupAccumulator<Falloff>& sum, uint32_t sets) {
+std::vector<uint32_t> strongest(TermAccumulator<Falloff>& sum, uint32_t sets) {
     std::vector<uint32_t> groups;
     for (uint32_t g : sum.touched())
         if (g != always_group) groups.push_back(g);
@@ -281,7 +288,7 @@ std::vector<Storage> storages(float exposure) {
     return out;
 }
 
-void measureStorage(Storage& s, GroupAccumulator<Falloff>& sum, std::span<const glm::vec3> normals) {
+void measureStorage(Storage& s, TermAccumulator<Falloff>& sum, std::span<const glm::vec3> normals) {
     std::vector<TexelRecord> records;
     std::array<glm::vec3, tilted_count> exact{};
     for (uint32_t g : strongest(sum, s.sets)) {
@@ -303,7 +310,7 @@ Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::spa
     const auto bake = rebake(scene, pack, progress);
     if (!bake) return std::unexpected(bake.error());
     progress.stage("causes of error", points.size());
-    const Mixed mixed(state);
+    const Mixed mixed(*(*bake)->paths, state);
     std::vector<Steps> steps(points.size());
     tbb::parallel_for(size_t{0}, points.size(), [&](size_t i) {
         steps[i] = stepsAt(**bake, pack, points[i], pairs[i], mixed);
@@ -320,13 +327,13 @@ Expected<std::vector<FormatError>> formatErrors(const Scene& scene, const Pack& 
     const auto bake = rebake(scene, pack, progress);
     if (!bake) return std::unexpected(bake.error());
     progress.stage("formats", points.size());
-    const auto group_count = static_cast<uint32_t>((*bake)->series.groups.size());
+    const uint32_t group_count = (*bake)->paths->groupCount();
     std::vector<std::vector<Storage>> at(points.size());
     tbb::parallel_for(size_t{0}, points.size(), [&](size_t i) {
         progress.advance(1);
         const Footprint footprint = footprintOf(**bake, pack, points[i]);
         if (!footprint.centre) return;
-        GroupAccumulator<Falloff> sum(group_count);
+        TermAccumulator<Falloff> sum(group_count);
         const auto normals = tiltedNormals(static_cast<uint32_t>(i));
         gatherFalloff(**bake, *footprint.centre, static_cast<uint32_t>(i), normals, sum);
         at[i] = storages(pack.exposure());

@@ -51,6 +51,7 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap) {
         const Face face = unwrap.faces[f];
         const LevelTriangle& t = rays.triangles()[face.triangle];
         const SceneMesh& from = scene.meshes[t.mesh];
+        if (from.is_open_leaf) continue;  // the game moves the closed one
         const uint32_t page = unwrap.charts[unwrap.face_chart[f]].page;
         const auto [it, fresh] = builders.try_emplace({t.mesh, t.material, page});
         if (fresh) {

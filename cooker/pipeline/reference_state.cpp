@@ -1,6 +1,7 @@
 #include <pipeline/reference_state.h>
 
 #include <bake/sampling.h>
+#include <scene/open_pose.h>
 #include <update/state_text.h>
 
 #include <fmt/format.h>
@@ -28,9 +29,6 @@ Expected<void> setDoor(const Scene& scene, const StateAssignment& item, Referenc
     if (item.value.r != 0 && item.value.r != 1)
         return fail(ErrorCode::InvalidArgument,
                     fmt::format("Door \"{}\" is {} open; the reference takes 0 or 1.", item.name, item.value.r));
-    if (item.value.r == 1 && scene.doors[*door].pose)
-        return fail(ErrorCode::Unsupported,
-                    fmt::format("Door \"{}\" opens by a pose, which the reference does not trace yet.", item.name));
     state.door_open[*door] = item.value.r == 1;
     return {};
 }
@@ -66,7 +64,10 @@ Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view
 }
 
 Scene sceneInState(Scene scene, const ReferenceState& state) {
-    std::erase_if(scene.meshes, [&](const SceneMesh& mesh) { return mesh.door && state.door_open[*mesh.door]; });
+    const auto is_open = [&](const SceneMesh& mesh) { return mesh.door && state.door_open[*mesh.door]; };
+    std::erase_if(scene.meshes, [&](const SceneMesh& m) { return is_open(m) && !scene.doors[*m.door].pose; });
+    for (SceneMesh& mesh : scene.meshes)
+        if (is_open(mesh)) mesh = inOpenPose(std::move(mesh));
     return scene;
 }
 

@@ -17,10 +17,9 @@ struct ReferenceState {
 };
 
 // Reads e.g. "hall=0.5,door:front=1". Doors are closed or open: what half open looks like is a matter of blending.
-// An open pose is not traced yet: such a door is refused unless it is closed.
 Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view state);
 
-// The level as it stands: open doors are gone.
+// The level as it stands: open doors are gone, or in their open poses.
 Scene sceneInState(Scene scene, const ReferenceState& state);
 
 // When a point has had enough paths: once the standard error of its luminance is at most `relative` * (E + floor).

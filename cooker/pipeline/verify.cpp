@@ -238,7 +238,8 @@ Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOpti
         if (!effect) return std::unexpected(effect.error());
         SetReport set{scene.light_sets[s].name, *effect, 0};
         for (const Contribution& c : pack.contributions())
-            if (c.light_set == s) set.energy_dropped = static_cast<double>(c.energy_dropped);
+            if (c.light_set == s && c.doors_open.empty() && c.doors_closed.empty())
+                set.energy_dropped = static_cast<double>(c.energy_dropped);
         report.sets.push_back(set);
     }
     return {};

@@ -2,6 +2,7 @@
 #include <scene/elements.h>
 
 #include <algorithm>
+#include <glm/gtc/quaternion.hpp>
 
 namespace dimmer::cook {
 
@@ -37,7 +38,6 @@ Expected<std::optional<uint32_t>> Elements::door(const Extras& extras, const std
         doors_.emplace_back().owner = owner;
     }
     if (const auto ok = readOpening(extras, owner, door->second); !ok) return std::unexpected(ok.error());
-    if (const auto ok = readPose(extras, owner, door->second); !ok) return std::unexpected(ok.error());
     return door->second;
 }
 
@@ -58,37 +58,23 @@ Expected<void> Elements::readOpening(const Extras& extras, const std::string& ow
     return {};
 }
 
-Expected<void> Elements::readPose(const Extras& extras, const std::string& owner, uint32_t index) {
+Expected<glm::dmat4> Elements::openPose(const Extras& extras, const std::string& owner, uint32_t index) {
     const auto rotation = extras.numbers("dimmer_door_rotation", 4);
     if (!rotation) return std::unexpected(rotation.error());
     const auto translation = extras.numbers("dimmer_door_translation", 3);
     if (!translation) return std::unexpected(translation.error());
-    if (!*rotation && !*translation) return {};
-
-    SceneDoor pose;
+    glm::dmat4 pose(1);
     if (*rotation) {
         const auto& q = **rotation;
-        const glm::dvec4 quaternion(q[0], q[1], q[2], q[3]);
-        const double length = glm::length(quaternion);
-        if (!(length > 1e-6))
+        const glm::dquat quaternion(q[3], q[0], q[1], q[2]);  // w first
+        if (!(glm::length(quaternion) > 1e-6))
             return context_.error(owner,
                                   "'dimmer_door_rotation' must be a quaternion x, y, z, w of length 1. Correct it.");
-        pose.open_rotation = quaternion / length;
+        pose = glm::mat4_cast(glm::normalize(quaternion));
     }
-    if (*translation) pose.open_translation_m = glm::vec3((**translation)[0], (**translation)[1], (**translation)[2]);
-
-    SceneDoor& door = context_.scene.doors[index];
-    std::string& stated_by = doors_[index].pose_owner;
-    const bool differs = door.open_rotation != pose.open_rotation || door.open_translation_m != pose.open_translation_m;
-    if (!stated_by.empty() && differs)
-        return context_.error(owner,
-                              fmt::format("its open pose differs from that of {}, which is the same door '{}'. Make "
-                                          "them alike, or name two doors.",
-                                          stated_by, door.name));
-    stated_by = owner;
-    door.open_rotation = pose.open_rotation;
-    door.open_translation_m = pose.open_translation_m;
-    return {};
+    if (*translation) pose[3] = {(**translation)[0], (**translation)[1], (**translation)[2], 1};
+    if (*rotation || *translation) doors_[index].pose_owner = owner;
+    return pose;
 }
 
 Expected<void> Elements::checkDoors() const {
@@ -104,6 +90,12 @@ Expected<void> Elements::checkDoors() const {
                           fmt::format("the open pose of door '{}' was ignored, as it opens by 'remove'; "
                                       "set 'dimmer_door_open' to 'pose' to use it.",
                                       name));
+        if (doors_[i].pose_owner.empty() && context_.scene.doors[i].pose)
+            context_.warn(
+                doors_[i].owner,
+                fmt::format("the door '{}' opens by a pose, but states none: opening it changes nothing. Give "
+                            "it 'dimmer_door_rotation' or 'dimmer_door_translation'.",
+                            name));
     }
     return {};
 }

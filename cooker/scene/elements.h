@@ -17,11 +17,15 @@ class Elements {
     // The light set that the extras name and its maximum weight; empty when they name none.
     Expected<std::optional<uint32_t>> lightSet(const Extras& extras, const std::string& owner);
 
-    // The door that the extras name, with its open pose; empty when they name none.
+    // The door that the extras name; empty when they name none.
     Expected<std::optional<uint32_t>> door(const Extras& extras, const std::string& owner);
 
+    // The open pose that a door's node states, as it would place something in that node's own axes; the identity when
+    // it states none.
+    Expected<glm::dmat4> openPose(const Extras& extras, const std::string& owner, uint32_t door);
+
     void doorHasGeometry(uint32_t door) { doors_[door].has_geometry = true; }
-    // An error for the first door that nothing gave geometry to.
+    // An error for the first door that nothing gave geometry to; warnings for poses that do nothing.
     Expected<void> checkDoors() const;
 
     // `dimmer_combinations`, after all elements are known.
@@ -34,7 +38,6 @@ class Elements {
         bool has_geometry = false;
     };
     Expected<void> readOpening(const Extras& extras, const std::string& owner, uint32_t door);
-    Expected<void> readPose(const Extras& extras, const std::string& owner, uint32_t door);
     Expected<ElementRef> named(const std::string& name) const;
     Expected<void> combination(const tinygltf::Value& list);
 

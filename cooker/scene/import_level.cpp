@@ -129,10 +129,22 @@ class LevelImporter {
     Expected<void> door(const PlacedNode& at, const Extras& extras, const std::string& owner) {
         const auto own = elements_.door(extras, owner);
         if (!own) return std::unexpected(own.error());
-        auto& door = door_of_node_[static_cast<size_t>(at.node)];
-        door = *own;
-        if (!door && at.parent >= 0) door = door_of_node_[static_cast<size_t>(at.parent)];
+        DoorPart& part = door_of_node_[static_cast<size_t>(at.node)];
+        if (!*own) {
+            if (at.parent >= 0) part = door_of_node_[static_cast<size_t>(at.parent)];
+            return {};
+        }
+        const auto pose = elements_.openPose(extras, owner, **own);
+        if (!pose) return std::unexpected(pose.error());
+        part = {*own, at.singular == -1 ? inWorld(*pose, at.world_from_node) : glm::dmat4(1)};
         return {};
+    }
+
+    // A movement in metres along and about a node's axes, as a movement in the world.
+    static glm::dmat4 inWorld(const glm::dmat4& movement, const glm::dmat4& world_from_node) {
+        glm::dmat4 unscaled = world_from_node;
+        for (int axis = 0; axis < 3; ++axis) unscaled[axis] = glm::normalize(unscaled[axis]);
+        return unscaled * movement * glm::inverse(unscaled);
     }
 
     Expected<Lighting> lighting(const Extras& extras, const std::string& owner) const {
@@ -230,7 +242,9 @@ class LevelImporter {
         mesh.texels_per_metre = settings.texels_per_metre;
         mesh.grid_spacing_m = settings.grid_spacing_m;
         if (isEmissiveMesh(mesh)) mesh.light_set = light_set;
-        mesh.door = door_of_node_[static_cast<size_t>(at.node)];
+        const DoorPart& part = door_of_node_[static_cast<size_t>(at.node)];
+        mesh.door = part.door;
+        mesh.open_from_closed = part.open_from_closed;
         if (mesh.door && mesh.lighting != Lighting::Dynamic) elements_.doorHasGeometry(*mesh.door);
         scene_.meshes.push_back(std::move(mesh));
     }
@@ -318,7 +332,11 @@ class LevelImporter {
     Elements elements_{context_};
     LightProfiles profiles_{context_};
     std::optional<MeshImporter> meshes_;
-    std::vector<std::optional<uint32_t>> door_of_node_;
+    struct DoorPart {
+        std::optional<uint32_t> door;
+        glm::dmat4 open_from_closed{1};
+    };
+    std::vector<DoorPart> door_of_node_;
 };
 
 }  // namespace

@@ -60,6 +60,8 @@ struct SceneMesh {
     Lighting lighting = Lighting::Automatic;
     std::optional<uint32_t> light_set;  // its emissive materials belong to that set
     std::optional<uint32_t> door;
+    glm::dmat4 open_from_closed{1};  // of a leaf whose door opens by a pose: a rotation and a translation, world space
+    bool is_open_leaf = false;       // this is that leaf where it stands open (scene/open_pose.h)
     std::optional<float> texels_per_metre;
     std::optional<float> grid_spacing_m;
 };
@@ -91,9 +93,7 @@ struct SceneLightSet {
 
 struct SceneDoor {
     std::string name;
-    bool pose = false;                    // open means: stands in its open pose; else it is ignored
-    glm::vec4 open_rotation{0, 0, 0, 1};  // quaternion x y z w, relative to the closed pose
-    glm::vec3 open_translation_m{0};
+    bool pose = false;  // open means: its leaves stand in their open poses; else they are ignored
 };
 
 struct SceneViewpoint {

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
+#include <tuple>
 
 namespace dimmer::cook {
 namespace {
@@ -23,12 +23,34 @@ constexpr int transparent_layers_max = 64;
 struct RayScene::Embree {
     RTCDevice device = rtcNewDevice(nullptr);
     RTCScene scene = rtcNewScene(device);
-    std::vector<uint32_t> triangle_of[2];  // Embree primitive -> level triangle, per geometry
+    std::vector<uint32_t> triangle_of[2];  // Embree primitive -> level triangle; opaque, transparent
 
+    Embree(const RayScene& level, Surfaces surfaces) {
+        for (uint32_t t = 0; t < level.triangles().size(); ++t) {
+            const LevelTriangle& triangle = level.triangles()[t];
+            const bool leaf = triangle.condition != no_condition;
+            if (surfaces != Surfaces::All && leaf != (surfaces == Surfaces::Leaves)) continue;
+            const bool transparent = level.scene().materials[triangle.material].alpha_mode != AlphaMode::Opaque;
+            triangle_of[transparent].push_back(t);
+        }
+        attach(0, level);
+        attach(1, level);
+        // Robust: rays must not slip through the edges that closed rooms are made of.
+        const bool collects = surfaces == Surfaces::Leaves;
+        rtcSetSceneFlags(
+            scene, collects ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : RTC_SCENE_FLAG_ROBUST);
+        // High quality splits triangles, and a split one would be collected twice.
+        rtcSetSceneBuildQuality(scene, collects ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+        rtcCommitScene(scene);
+    }
     ~Embree() {
         rtcReleaseScene(scene);
         rtcReleaseDevice(device);
     }
+    Embree(const Embree&) = delete;
+    Embree& operator=(const Embree&) = delete;
+
+    bool anyTransparent() const { return !triangle_of[1].empty(); }
 
     void attach(unsigned geometry_id, const RayScene& level) {
         const auto& list = triangle_of[geometry_id];
@@ -53,8 +75,8 @@ struct RayScene::Embree {
         rtcReleaseGeometry(geometry);
     }
 
-    bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m,
-                   unsigned mask) const {
+    static void prepare(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m,
+                        unsigned mask) {
         ray_hit.ray = {.org_x = origin.x,
                        .org_y = origin.y,
                        .org_z = origin.z,
@@ -68,6 +90,11 @@ struct RayScene::Embree {
                        .id = 0,
                        .flags = 0};
         ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    }
+
+    bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m,
+                   unsigned mask) const {
+        prepare(ray_hit, origin, direction, near_m, far_m, mask);
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
         rtcIntersect1(scene, &context, &ray_hit);
@@ -94,33 +121,59 @@ struct RayScene::Embree {
     }
 };
 
-RayScene::RayScene(const Scene& scene) : scene_(scene), embree_(std::make_unique<Embree>()) {
+namespace {
+
+// Collects every hit of a ray instead of the nearest.
+struct Collector {
+    RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
+    LeafHits hits;
+    const std::vector<uint32_t>* triangle_of;
+};
+
+void collect(const RTCFilterFunctionNArguments* args) {
+    auto& into = *reinterpret_cast<Collector*>(args->context);
+    const auto* ray = reinterpret_cast<const RTCRay*>(args->ray);
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+    args->valid[0] = 0;  // go on
+    if (into.hits.count == LeafHits::max) return;
+    const uint32_t triangle = into.triangle_of[hit->geomID][hit->primID];
+    into.hits.hits[into.hits.count++] = {triangle, ray->tfar, hit->u, hit->v, false};
+}
+
+}  // namespace
+
+RayScene::RayScene(const Scene& scene) : scene_(scene) {
     bounds_min_ = glm::vec3(std::numeric_limits<float>::max());
     bounds_max_ = glm::vec3(std::numeric_limits<float>::lowest());
+    bool any_leaf = false;
     for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
         const SceneMesh& mesh = scene.meshes[m];
         if (mesh.lighting == Lighting::Dynamic) continue;
+        any_leaf |= mesh.door.has_value();
         for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
             const auto level_triangle = static_cast<uint32_t>(triangles_.size());
-            triangles_.push_back({.mesh = m, .triangle = t, .material = mesh.triangle_materials[t]});
+            triangles_.push_back({.mesh = m,
+                                  .triangle = t,
+                                  .material = mesh.triangle_materials[t],
+                                  .normal = {},
+                                  .condition = mesh.door ? 2 * *mesh.door + mesh.is_open_leaf : no_condition});
             const glm::vec3 a = corner(level_triangle, 0), b = corner(level_triangle, 1), c = corner(level_triangle, 2);
             triangles_.back().normal = glm::normalize(glm::cross(b - a, c - a));
             bounds_min_ = glm::min(bounds_min_, glm::min(a, glm::min(b, c)));
             bounds_max_ = glm::max(bounds_max_, glm::max(a, glm::max(b, c)));
-            const bool transparent = scene.materials[mesh.triangle_materials[t]].alpha_mode != AlphaMode::Opaque;
-            embree_->triangle_of[transparent].push_back(level_triangle);
         }
     }
-    any_transparent_ = !embree_->triangle_of[1].empty();
-    embree_->attach(0, *this);
-    embree_->attach(1, *this);
-    // Robust: rays must not slip through the edges that closed rooms are made of.
-    rtcSetSceneFlags(embree_->scene, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(embree_->scene, RTC_BUILD_QUALITY_HIGH);
-    rtcCommitScene(embree_->scene);
+    all_ = std::make_unique<Embree>(*this, Surfaces::All);
+    if (!any_leaf) return;
+    walls_ = std::make_unique<Embree>(*this, Surfaces::Walls);
+    leaves_ = std::make_unique<Embree>(*this, Surfaces::Leaves);
 }
 
 RayScene::~RayScene() = default;
+
+const RayScene::Embree& RayScene::embree(Surfaces surfaces) const {
+    return surfaces == Surfaces::Walls && walls_ ? *walls_ : surfaces == Surfaces::Leaves && leaves_ ? *leaves_ : *all_;
+}
 
 glm::vec3 RayScene::corner(uint32_t triangle, int i) const {
     const LevelTriangle& t = triangles_[triangle];
@@ -147,18 +200,21 @@ glm::vec4 RayScene::surfaceColor(uint32_t triangle, float u, float v) const {
 
 float RayScene::alphaAt(uint32_t triangle, float u, float v) const {
     const Material& material = scene_.materials[triangles_[triangle].material];
+    if (material.alpha_mode == AlphaMode::Opaque) return 1;
     const float alpha = surfaceColor(triangle, u, v).a;
     if (material.alpha_mode == AlphaMode::Mask) return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
     return std::clamp(alpha, 0.0f, 1.0f);
 }
 
-std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed) const {
+std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
+                                     Surfaces surfaces) const {
+    const Embree& among = embree(surfaces);
     float near_m = 0;
     for (int layer = 0; layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!embree_->intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent))
+        if (!among.intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent))
             return std::nullopt;
-        const uint32_t triangle = embree_->triangle_of[r.hit.geomID][r.hit.primID];
+        const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
         const Hit hit{.triangle = triangle,
                       .distance_m = r.ray.tfar,
                       .u = r.hit.u,
@@ -171,22 +227,41 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     return std::nullopt;
 }
 
-float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
-    if (embree_->occluded(origin, direction, distance_m, mask_opaque)) return 0;
+float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces) const {
+    const Embree& among = embree(surfaces);
+    if (among.occluded(origin, direction, distance_m, mask_opaque)) return 0;
     float passed = 1, near_m = 0;
-    for (int layer = 0; any_transparent_ && layer < transparent_layers_max; ++layer) {
+    for (int layer = 0; among.anyTransparent() && layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!embree_->intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
-        passed *= 1 - alphaAt(embree_->triangle_of[1][r.hit.primID], r.hit.u, r.hit.v);
+        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
+        passed *= 1 - alphaAt(among.triangle_of[1][r.hit.primID], r.hit.u, r.hit.v);
         if (passed <= 0) return 0;
         near_m = r.ray.tfar + step_past_m;
     }
     return passed;
 }
 
+LeafHits RayScene::leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
+    if (!leaves_) return {};
+    Collector collector;
+    rtcInitIntersectContext(&collector.context);
+    collector.context.filter = collect;
+    collector.triangle_of = leaves_->triangle_of;
+    RTCRayHit r;
+    leaves_->prepare(r, origin, direction, 0, distance_m, mask_opaque | mask_transparent);
+    rtcIntersect1(leaves_->scene, &collector.context, &r);
+    LeafHits& found = collector.hits;
+    std::sort(found.hits.data(), found.hits.data() + found.count, [](const Hit& a, const Hit& b) {
+        return std::tie(a.distance_m, a.triangle) < std::tie(b.distance_m, b.triangle);
+    });
+    for (uint32_t i = 0; i < found.count; ++i)
+        found.hits[i].back = glm::dot(direction, triangles_[found.hits[i].triangle].normal) > 0;
+    return found;
+}
+
 bool RayScene::blocked(glm::vec3 from, glm::vec3 to) const {
     const float distance_m = glm::length(to - from);
-    return distance_m > 0 && embree_->occluded(from, (to - from) / distance_m, distance_m, mask_opaque);
+    return distance_m > 0 && all_->occluded(from, (to - from) / distance_m, distance_m, mask_opaque);
 }
 
 }  // namespace dimmer::cook

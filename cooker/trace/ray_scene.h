@@ -3,6 +3,7 @@
 
 #include <scene/scene.h>
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <memory>
@@ -11,19 +12,36 @@
 
 namespace dimmer::cook {
 
+// "Door d stands closed" is condition 2 d, "stands open" 2 d + 1; the other one of a pair is `condition ^ 1`.
+inline constexpr uint32_t no_condition = UINT32_MAX;
+
 // A triangle of the level in the one order that all stages share: meshes in scene order, then triangles.
 struct LevelTriangle {
     uint32_t mesh = 0;
     uint32_t triangle = 0;  // within the mesh
     uint32_t material = 0;
-    glm::vec3 normal{0};  // geometric, unit
+    glm::vec3 normal{0};                // geometric, unit
+    uint32_t condition = no_condition;  // of a door's leaf: it is there while this holds
 };
+
+// What a ray meets: everything, with every leaf where it stands; only what is always there; or leaves alone.
+enum class Surfaces { All, Walls, Leaves };
 
 struct Hit {
     uint32_t triangle = 0;  // into RayScene::triangles()
     float distance_m = 0;
     float u = 0, v = 0;  // barycentric weights of the second and third corner
     bool back = false;   // the side that faces away from the triangle's front was hit
+};
+
+// Leaf surfaces along one ray. More than these lie one behind another nowhere that light should get through.
+struct LeafHits {
+    static constexpr uint32_t max = 32;
+    uint32_t count = 0;
+    std::array<Hit, max> hits;
+
+    const Hit* begin() const { return hits.data(); }
+    const Hit* end() const { return hits.data() + count; }
 };
 
 // Immutable after construction; every query is thread-safe.
@@ -36,10 +54,18 @@ class RayScene {
 
     // The nearest surface that stops the ray. A blended surface stops it with probability alpha, drawn from `seed`;
     // a masked one where its alpha is at or above the cutoff.
-    std::optional<Hit> nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed) const;
+    std::optional<Hit> nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
+                               Surfaces surfaces = Surfaces::All) const;
 
     // The share of light, 0..1, that passes from `origin` along `direction` for `distance_m`.
-    float transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m) const;
+    float transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m,
+                        Surfaces surfaces = Surfaces::All) const;
+
+    // The surfaces of doors' leaves along a ray, nearest first, whether they stop it or not.
+    LeafHits leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const;
+    bool anyLeaf() const { return leaves_ != nullptr; }
+    // The share of light, 0..1, that a surface stops there.
+    float alphaAt(uint32_t triangle, float u, float v) const;
 
     // Whether any opaque surface stands between.
     bool blocked(glm::vec3 from, glm::vec3 to) const;
@@ -55,13 +81,12 @@ class RayScene {
 
    private:
     struct Embree;
-    float alphaAt(uint32_t triangle, float u, float v) const;
+    const Embree& embree(Surfaces surfaces) const;
 
     const Scene& scene_;
     std::vector<LevelTriangle> triangles_;
-    std::unique_ptr<Embree> embree_;
+    std::unique_ptr<Embree> all_, walls_, leaves_;  // the last two only where there are doors
     glm::vec3 bounds_min_{0}, bounds_max_{0};
-    bool any_transparent_ = false;
 };
 
 }  // namespace dimmer::cook

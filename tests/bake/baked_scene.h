@@ -29,10 +29,10 @@ struct BakedScene {
         SilentProgress quiet;
         baked = cook::bake(*rays, charts, texels, settings, quiet);
     }
-    // Of one light group at a receiver; nothing stored is darkness.
-    glm::vec3 lux(size_t receiver, uint32_t group = always_group) const {
+    // Of one term at a receiver; nothing stored is darkness.
+    glm::vec3 lux(size_t receiver, uint32_t term = always_group) const {
         for (const ReceiverLight& l : baked.light.row(receiver))
-            if (l.group == group) return l.light.irradiance_lux;
+            if (l.term == term) return l.light.irradiance_lux;
         return glm::vec3(0);
     }
     glm::vec3 normal(size_t receiver) const { return charts.frames[texels.sample(receiver, 0).face].normal; }

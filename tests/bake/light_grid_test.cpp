@@ -92,16 +92,18 @@ TEST(LightGrid, NothingIsMissedInTheOpen) {
 }
 
 struct Direct {
-    std::vector<std::vector<std::pair<uint32_t, glm::vec3>>> rows;  // (group, lux) per receiver
+    std::vector<std::vector<std::pair<uint32_t, glm::vec3>>> rows;  // (term, lux) per receiver
     uint64_t rays = 0;
 };
 Direct directOf(const BakedScene& b, bool enabled) {
     const LightGrid grid(*b.rays, enabled);
     Direct out;
-    const auto groups = static_cast<uint32_t>(1 + b.scene.light_sets.size());
-    GroupAccumulator<Gathered> reflected(groups), stored(groups);
+    const DoorPaths paths(b.scene);
+    const EmitterSampler emitters(*b.rays, meshGroups(b.scene));
+    const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
+    TermAccumulator<Gathered> reflected(paths.termCount()), stored(paths.termCount());
     for (size_t i = 0; i < b.texels.size(); ++i) {
-        out.rays += directLight(*b.rays, grid, b.charts, b.texels, i, reflected, stored);
+        out.rays += directLight(gatherer, grid, i, reflected, stored);
         auto& row = out.rows.emplace_back();
         for (const uint32_t g : reflected.touched()) row.emplace_back(g, reflected[g].irradiance_lux);
         reflected.clear();

@@ -50,7 +50,9 @@ Stored store() {
     for (uint32_t i = 0; i < scene->light_sets.size(); ++i)
         s.pack.contributions.push_back({.light_set = i, .doors_open = {}, .doors_closed = {}});
     for (const SceneLightSet& set : scene->light_sets) s.pack.elements.push_back({set.name, ElementKind::LightSet, 1});
-    buildClusters(s.texels, s.baked, s.pack);
+    std::vector<uint32_t> contribution_of_term{no_index};
+    for (uint32_t i = 0; i < s.pack.contributions.size(); ++i) contribution_of_term.push_back(i);
+    buildClusters(s.texels, s.baked, contribution_of_term, s.pack);
     return s;
 }
 
@@ -84,7 +86,7 @@ TEST_F(Clusters, HoldWhatTheBakeKept) {
     std::map<std::pair<uint32_t, uint32_t>, glm::vec3> kept;  // address, contribution -> lux
     auto keep = [&](uint32_t address, uint32_t receiver) {
         for (const ReceiverLight& l : stored().baked.light.row(receiver))
-            if (l.group != always_group) kept[{address, l.group - 1}] = l.light.irradiance_lux;
+            if (l.term != always_group) kept[{address, l.term - 1}] = l.light.irradiance_lux;
     };
     for (uint32_t i = 0; i < stored().texels.size(); ++i) keep(stored().texels.address[i], i);
     for (const FillTexel& fill : stored().texels.fills) keep(fill.address, fill.source);
@@ -152,7 +154,7 @@ TEST_F(Clusters, BasePagesHoldTheAlwaysOnLight) {
     std::map<uint32_t, glm::vec3> base;
     auto keep = [&](uint32_t address, uint32_t receiver) {
         for (const ReceiverLight& l : stored().baked.light.row(receiver))
-            if (l.group == always_group) base[address] = l.light.irradiance_lux;
+            if (l.term == always_group) base[address] = l.light.irradiance_lux;
     };
     for (uint32_t i = 0; i < stored().texels.size(); ++i) keep(stored().texels.address[i], i);
     for (const FillTexel& fill : stored().texels.fills) keep(fill.address, fill.source);

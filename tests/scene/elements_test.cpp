@@ -155,9 +155,9 @@ TEST(SceneElements, OpenPose) {
     auto scene = level.import();
     ASSERT_IMPORTED(scene);
     EXPECT_TRUE(scene->doors[0].pose);
-    EXPECT_FLOAT_EQ(scene->doors[0].open_rotation.y, std::sqrt(0.5f));  // normalised
-    EXPECT_FLOAT_EQ(scene->doors[0].open_rotation.w, std::sqrt(0.5f));
-    EXPECT_EQ(scene->doors[0].open_translation_m, glm::vec3(0.5f, 0, 1));
+    // A quarter turn about +Y (the quaternion is normalised), then the translation.
+    const glm::dvec4 moved = scene->meshes[1].open_from_closed * glm::dvec4(1, 2, 3, 1);
+    EXPECT_NEAR(glm::distance(moved, glm::dvec4(3.5, 2, 0, 1)), 0, 1e-12);
 
     level.node(door)["extras"].erase("dimmer_door_open");
     scene = level.import();
@@ -168,6 +168,45 @@ TEST(SceneElements, OpenPose) {
         level.node(door)["extras"]["dimmer_door_rotation"] = bad;
         expectBadInput(level.import(), {"node 'leaf'", "dimmer_door_rotation"});
     }
+}
+
+// A double door: each leaf turns about its own hinge, in metres whatever the node's scale, and takes along what hangs
+// below it.
+TEST(SceneElements, LeavesOfOneDoorHavePosesOfTheirOwn) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(0);
+    const double s = std::sqrt(0.5);
+    const auto leaf = [&](const char* name, double x, double turn) {
+        return level.addNode(
+            {{"name", name},
+             {"mesh", mesh},
+             {"translation", {x, 0, 0}},
+             {"scale", {2, 1, 3}},
+             {"extras",
+              {{"dimmer_door", "double"}, {"dimmer_door_open", "pose"}, {"dimmer_door_rotation", {0, turn, 0, s}}}}});
+    };
+    leaf("left", -1, s);
+    const int right = leaf("right", 1, -s);
+    level.addNode({{"name", "handle"}, {"mesh", mesh}}, right);
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->doors.size(), 1u);
+    ASSERT_EQ(scene->meshes.size(), 4u);
+    const auto turned = [&](size_t m) { return scene->meshes[m].open_from_closed * glm::dvec4(0, 0, 0, 1); };
+    // One metre towards +X from the left hinge is one towards -Z after a quarter turn about +Y; the right leaf alike.
+    EXPECT_NEAR(glm::distance(turned(1), glm::dvec4(-1, 0, -1, 1)), 0, 1e-12);
+    EXPECT_NEAR(glm::distance(turned(2), glm::dvec4(1, 0, -1, 1)), 0, 1e-12);
+    EXPECT_EQ(turned(3), turned(2));
+}
+
+TEST(SceneElements, APoseThatIsNotStatedIsWarnedOf) {
+    LevelFile level = LevelFile::withFloor();
+    level.addNode({{"name", "leaf"},
+                   {"mesh", level.addSquareMesh(0)},
+                   {"extras", {{"dimmer_door", "front"}, {"dimmer_door_open", "pose"}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'leaf'", "front", "dimmer_door_translation"});
 }
 
 TEST(SceneElements, NodesOfADoorMustAgreeHowItOpens) {

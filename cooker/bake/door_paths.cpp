@@ -1,0 +1,107 @@
+#include <bake/door_paths.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+namespace dimmer::cook {
+namespace {
+
+using Conditions = std::vector<uint32_t>;  // ascending
+
+// Every way that some of `doors`, from `first` on, may stand open or closed.
+void addStates(const std::vector<uint32_t>& doors, size_t first, const Conditions& so_far, std::set<Conditions>& out) {
+    out.insert(so_far);
+    for (size_t i = first; i < doors.size(); ++i)
+        for (uint32_t open : {0u, 1u}) {
+            Conditions more = so_far;
+            more.push_back(2 * doors[i] + open);
+            addStates(doors, i + 1, more, out);
+        }
+}
+
+// The conditions of both; empty where they contradict.
+std::optional<Conditions> join(const Conditions& a, const Conditions& b) {
+    Conditions all;
+    std::ranges::set_union(a, b, std::back_inserter(all));
+    for (size_t i = 1; i < all.size(); ++i)
+        if (all[i] == (all[i - 1] ^ 1)) return std::nullopt;
+    return all;
+}
+
+// Per light group, the paths that are kept.
+std::vector<std::set<Conditions>> keptPaths(const Scene& scene, uint32_t groups) {
+    std::set<Conditions> everyone;
+    for (uint32_t door = 0; door < scene.doors.size(); ++door) addStates({door}, 0, {}, everyone);
+    everyone.insert(Conditions{});
+    std::vector<std::set<Conditions>> kept(groups, everyone);
+    for (const auto& combination : scene.combinations) {
+        std::vector<uint32_t> doors;
+        std::optional<uint32_t> set;
+        for (const ElementRef& element : combination) {
+            if (element.is_door)
+                doors.push_back(element.index);
+            else
+                set = element.index;
+        }
+        std::ranges::sort(doors);
+        for (uint32_t g = 0; g < groups; ++g)
+            if (!set || g == groupOf(set)) addStates(doors, 0, {}, kept[g]);
+    }
+    return kept;
+}
+
+Term makeTerm(uint32_t group, const Conditions& conditions) {
+    Term term{group, {}, {}};
+    for (uint32_t c : conditions) (c & 1 ? term.doors_open : term.doors_closed).push_back(c / 2);
+    return term;
+}
+
+}  // namespace
+
+DoorPaths::DoorPaths(const Scene& scene)
+    : condition_count_(2 * static_cast<uint32_t>(scene.doors.size())),
+      group_count_(1 + static_cast<uint32_t>(scene.light_sets.size())) {
+    const auto kept = keptPaths(scene, group_count_);
+    std::set<Conditions> all;
+    for (const auto& of_group : kept) all.insert(of_group.begin(), of_group.end());
+    paths_.assign(all.begin(), all.end());
+    std::ranges::stable_sort(paths_, {}, &Conditions::size);  // the free path first
+    std::map<Conditions, uint32_t> index;
+    for (const Conditions& path : paths_) index.emplace(path, static_cast<uint32_t>(index.size()));
+    const auto find = [&](const std::optional<Conditions>& path) {
+        const auto it = path ? index.find(*path) : index.end();
+        return it == index.end() ? no_path : it->second;
+    };
+    for (const Conditions& path : paths_) {
+        for (uint32_t c = 0; c < condition_count_; ++c) {
+            with_.push_back(find(join(path, {c})));
+            Conditions rest = path;
+            std::erase(rest, c);
+            without_.push_back(std::ranges::binary_search(path, c ^ 1) ? no_path : find(rest));
+        }
+        for (const Conditions& other : paths_) joined_.push_back(find(join(path, other)));
+    }
+    term_of_.assign(paths_.size() * group_count_, no_term);
+    for (uint32_t p = 0; p < paths_.size(); ++p)
+        for (uint32_t g = 0; g < group_count_; ++g) {
+            if (!kept[g].contains(paths_[p])) continue;
+            term_of_[p * group_count_ + g] = static_cast<uint32_t>(terms_.size());
+            terms_.push_back(makeTerm(g, paths_[p]));
+            path_of_.push_back(p);
+        }
+}
+
+uint32_t DoorPaths::moved(uint32_t from, uint32_t path, uint32_t own) const {
+    uint32_t behind = path_of_[from];
+    if (own != no_condition) behind = without_[behind * condition_count_ + own];
+    if (behind == no_path) return no_term;
+    return term(terms_[from].group, joined_[path * paths_.size() + behind]);
+}
+
+uint32_t DoorPaths::leaving(uint32_t from, uint32_t own) const {
+    if (own == no_condition) return from;
+    return term(terms_[from].group, with(path_of_[from], own));
+}
+
+}  // namespace dimmer::cook

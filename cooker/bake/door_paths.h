@@ -1,0 +1,86 @@
+// Light and doors: which doors have to stand open, and which closed, for light to take its path. Every such set of
+// conditions is a path here, and every light group over every kept path a term: what packs store as a contribution.
+//
+// A leaf is there while its condition holds. Light that reflects off it needs the condition; light that goes through
+// the place of it needs the opposite. Both at once cannot be. Summed over all paths this is exact for every state of
+// the doors, each open or closed.
+#pragma once
+
+#include <scene/scene.h>
+#include <trace/ray_scene.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace dimmer::cook {
+
+inline constexpr uint32_t free_path = 0;  // touches no door
+inline constexpr uint32_t no_path = UINT32_MAX;
+inline constexpr uint32_t no_term = UINT32_MAX;
+
+// Light group 0 is all always-on light; group 1 + s is light set s.
+inline constexpr uint32_t always_group = 0;
+// The group of what belongs to an optional light set.
+inline uint32_t groupOf(std::optional<uint32_t> light_set) {
+    return light_set ? 1 + *light_set : always_group;
+}
+
+// One light group over paths that need these doors to be open or closed (indices into Scene::doors, ascending).
+struct Term {
+    uint32_t group = always_group;
+    std::vector<uint32_t> doors_open, doors_closed;
+    bool free() const { return doors_open.empty() && doors_closed.empty(); }
+};
+
+// How a leaf stands to light whose path is known so far.
+enum class Leaf {
+    Absent,  // the path needs the opposite
+    There,   // the path needs it
+    Either,  // the path parts here: one reflects off the leaf, one goes on
+};
+
+// Kept: every term with at most one door, and what `dimmer_combinations` names with all of its parts. A combination
+// with a light set keeps that set's terms alone, one without keeps every group's. Immutable; look-ups in tables of
+// paths^2 and paths * groups numbers.
+class DoorPaths {
+   public:
+    explicit DoorPaths(const Scene& scene);
+
+    uint32_t doorCount() const { return condition_count_ / 2; }
+    // The first terms are the light groups over free paths, so that a term below groupCount() is its own group.
+    const std::vector<Term>& terms() const { return terms_; }
+    uint32_t termCount() const { return static_cast<uint32_t>(terms_.size()); }
+    uint32_t groupCount() const { return group_count_; }
+
+    // The path that needs `condition` too; no_path where none is kept or the two contradict.
+    uint32_t with(uint32_t path, uint32_t condition) const { return with_[path * condition_count_ + condition]; }
+    bool needs(uint32_t path, uint32_t condition) const { return with(path, condition) == path; }
+    // `own`: the condition under which the receiver itself is there (a leaf's), or no_condition.
+    Leaf leaf(uint32_t path, uint32_t own, uint32_t condition) const {
+        if (own == condition || needs(path, condition)) return Leaf::There;
+        if (own == (condition ^ 1) || needs(path, condition ^ 1)) return Leaf::Absent;
+        return Leaf::Either;
+    }
+    // no_term where it is not kept.
+    uint32_t term(uint32_t group, uint32_t path) const {
+        return path == no_path ? no_term : term_of_[path * group_count_ + group];
+    }
+    // What light of `term` becomes along a ray of `path` to a receiver that is there under `own`, whose terms do not
+    // name that condition; no_term where it is not kept or cannot be.
+    uint32_t moved(uint32_t term, uint32_t path, uint32_t own) const;
+    // What light of `term` at a receiver that is there under `own` becomes as it leaves.
+    uint32_t leaving(uint32_t term, uint32_t own) const;
+
+   private:
+    uint32_t condition_count_ = 0, group_count_ = 1;
+    std::vector<std::vector<uint32_t>> paths_;  // conditions, ascending
+    std::vector<uint32_t> with_;                // path, condition
+    std::vector<uint32_t> without_;             // path, condition: without it; no_path where it needs the opposite
+    std::vector<uint32_t> joined_;              // path, path
+    std::vector<uint32_t> term_of_;             // path, group
+    std::vector<uint32_t> path_of_;             // per term
+    std::vector<Term> terms_;
+};
+
+}  // namespace dimmer::cook

@@ -1,0 +1,14 @@
+// Where the leaves of doors stand when they are open.
+#pragma once
+
+#include <scene/scene.h>
+
+namespace dimmer::cook {
+
+// A leaf as it stands while its door is open. `closed` must belong to a door that opens by a pose.
+SceneMesh inOpenPose(SceneMesh closed);
+
+// Adds the open leaves of all doors that open by a pose, beside the closed ones.
+void addOpenLeaves(Scene& scene);
+
+}  // namespace dimmer::cook

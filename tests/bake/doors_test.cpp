@@ -1,0 +1,261 @@
+// Doors in the bake: terms of light groups over open and closed doors, against scenes that leave the doors out.
+#include <bake/baked_scene.h>
+#include <bake/door_paths.h>
+#include <bake/door_rays.h>
+#include <bake/reference.h>
+#include <bake/test_scenes.h>
+#include <pipeline/reference_state.h>
+#include <scene/open_pose.h>
+
+#include <bit>
+#include <map>
+
+namespace dimmer::cook::test {
+namespace {
+
+// An outward-facing box.
+void addSolid(Scene& scene, const char* node, glm::vec3 centre, glm::vec3 half, uint32_t material,
+              std::optional<uint32_t> door = {}) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (float side : {-1.0f, 1.0f}) {
+            glm::vec3 place = centre, u(0), v(0);
+            place[axis] += side * half[axis];
+            u[(axis + 1) % 3] = half[(axis + 1) % 3];
+            v[(axis + 2) % 3] = half[(axis + 2) % 3];
+            addQuad(scene, node, place, side > 0 ? u : v, side > 0 ? v : u, material).door = door;
+        }
+}
+
+// A corridor of four rooms of 2 m in a row along x, parted by doors that fill it from wall to wall; two light sets and
+// a little always-on light.
+Scene corridor() {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f)), leaf = addMaterial(scene, lambert(0.8f));
+    const uint32_t glow = addMaterial(scene, emissive(glm::vec3(30)));
+    addBox(scene, {4, 1, 1}, white);
+    scene.doors = {{"a", false}, {"b", false}, {"c", false}};
+    for (uint32_t d = 0; d < 3; ++d)
+        addSolid(scene, "leaf", {-2 + 2 * static_cast<float>(d), 0, 0}, {0.1f, 1, 1}, leaf, d);
+    scene.light_sets = {{"first", 1}, {"third", 1}};
+    addPointLight(scene, {-3, 0.2f, 0.1f}, 100, BakeMode::Full).light_set = 0;
+    addPointLight(scene, {1, -0.2f, 0.3f}, 100, BakeMode::Indirect).light_set = 1;
+    addQuad(scene, "panel", {3, 0.95f, 0}, {0.3f, 0, 0}, {0, 0, 0.3f}, glow);
+    return scene;
+}
+
+TEST(DoorPaths, OneDoorIsKeptByItselfAndMoreByName) {
+    Scene scene;
+    scene.doors.resize(3);
+    scene.light_sets.resize(2);
+    const auto count = [&] { return DoorPaths(scene).termCount(); };
+    EXPECT_EQ(count(), 3u * (1 + 2 * 3));
+    scene.combinations = {{{true, 0}, {true, 2}}};
+    EXPECT_EQ(count(), 3u * (1 + 2 * 3 + 4));  // both open, both closed, one of each
+    scene.combinations = {{{true, 0}, {true, 2}, {false, 1}}};
+    EXPECT_EQ(count(), 3u * (1 + 2 * 3) + 4);  // for that set alone
+    scene.combinations = {{{true, 0}, {true, 1}, {true, 2}}};
+    EXPECT_EQ(count(), 3u * 27);
+    scene.doors.clear();
+    scene.combinations.clear();
+    EXPECT_EQ(count(), 3u);
+}
+
+TEST(DoorPaths, AddUpAndContradict) {
+    Scene scene;
+    scene.doors.resize(2);
+    scene.light_sets.resize(1);
+    scene.combinations = {{{true, 0}, {true, 1}}};
+    const DoorPaths paths(scene);
+    constexpr uint32_t a_closed = 0, a_open = 1, b_closed = 2;
+    const uint32_t through_a = paths.with(free_path, a_open);
+    EXPECT_EQ(paths.with(through_a, a_open), through_a);
+    EXPECT_EQ(paths.with(through_a, a_closed), no_path);
+    EXPECT_EQ(paths.leaf(through_a, no_condition, a_closed), Leaf::Absent);
+    EXPECT_EQ(paths.leaf(free_path, no_condition, a_closed), Leaf::Either);
+    EXPECT_EQ(paths.leaf(free_path, a_closed, a_closed), Leaf::There);
+    EXPECT_EQ(paths.leaf(free_path, a_open, a_closed), Leaf::Absent);
+    const uint32_t set_off_b = paths.term(1, paths.with(free_path, b_closed));
+    const uint32_t both = paths.moved(set_off_b, through_a, no_condition);
+    ASSERT_NE(both, no_term);
+    EXPECT_EQ(paths.terms()[both].group, 1u);
+    EXPECT_EQ(paths.terms()[both].doors_open, std::vector<uint32_t>{0});
+    EXPECT_EQ(paths.terms()[both].doors_closed, std::vector<uint32_t>{1});
+    // A leaf's own texels do not name its condition; what leaves them does.
+    EXPECT_EQ(paths.moved(set_off_b, free_path, b_closed), 1u);
+    EXPECT_EQ(paths.leaving(1, b_closed), set_off_b);
+    EXPECT_EQ(paths.moved(both, free_path, a_closed), no_term);
+}
+
+TEST(DoorRays, PartAtLeavesThatLetSomeLightThrough) {
+    Scene scene;
+    Material glass = lambert(0.5f);
+    glass.alpha_mode = AlphaMode::Blend;
+    glass.alpha = 0.25f;
+    const uint32_t pane = addMaterial(scene, glass), wood = addMaterial(scene, lambert(0.5f));
+    scene.doors.resize(2);
+    addQuad(scene, "pane", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, pane).door = 0;
+    addQuad(scene, "wood", {2, 0, 0}, {0, 1, 0}, {0, 0, 1}, wood).door = 1;
+    const RayScene rays(scene);
+    const auto ways = [&](const DoorPaths& paths, float distance) {
+        std::map<uint32_t, float> found;
+        forEachWay(rays, paths, no_condition, {0, 0.1f, 0.2f}, {1, 0, 0}, distance,
+                   [&](float share, uint32_t path) { found[path] += share; });
+        return found;
+    };
+    const DoorPaths single(scene);
+    const uint32_t open_pane = single.with(free_path, 1), open_wood = single.with(free_path, 3);
+    EXPECT_EQ(ways(single, 0.9f), (std::map<uint32_t, float>{{free_path, 1}}));
+    EXPECT_EQ(ways(single, 1.5f), (std::map<uint32_t, float>{{free_path, 0.75f}, {open_pane, 0.25f}}));
+    EXPECT_EQ(ways(single, 3), (std::map<uint32_t, float>{{open_wood, 0.75f}}));
+    scene.combinations = {{{true, 0}, {true, 1}}};
+    const DoorPaths both(scene);
+    const uint32_t wood_first = both.with(free_path, 3);
+    EXPECT_EQ(ways(both, 3), (std::map<uint32_t, float>{{wood_first, 0.75f}, {both.with(wood_first, 1), 0.25f}}));
+}
+
+// The light of a state: terms weighted by what they need. Bit d of `open`: door d; bit s of `sets`: set s.
+glm::dvec3 inState(const BakedScene& b, size_t receiver, uint32_t open, uint32_t sets) {
+    glm::dvec3 sum(0);
+    for (const ReceiverLight& l : b.baked.light.row(receiver)) {
+        const Term& t = b.baked.terms[l.term];
+        bool on = t.group == always_group || (sets >> (t.group - 1) & 1);
+        for (uint32_t d : t.doors_open) on &= open >> d & 1;
+        for (uint32_t d : t.doors_closed) on &= !(open >> d & 1);
+        if (on) sum += glm::dvec3(l.light.irradiance_lux);
+    }
+    return sum;
+}
+
+// Sums of baked light and reference over every `step`-th texel of the walls, in one state.
+struct Compared {
+    double baked = 0, reference = 0, noise = 0;  // lux; standard error of the sum
+    double absolute = 0;                         // sum of |baked - reference|
+};
+Compared compare(const BakedScene& b, const Scene& level, uint32_t open, uint32_t sets, size_t points, uint32_t paths,
+                 auto&& at) {
+    ReferenceState state{{}, {}};
+    for (uint32_t d = 0; d < level.doors.size(); ++d) state.door_open.push_back(open >> d & 1);
+    const Scene stands = sceneInState(level, state);
+    const RayScene rays(stands);
+    ReferenceOptions options{.seed = 7, .set_weights = {}};
+    for (uint32_t s = 0; s < level.light_sets.size(); ++s) options.set_weights.emplace_back(sets >> s & 1);
+    const ReferenceTracer tracer(rays, options);
+    std::vector<size_t> walls;
+    for (size_t i = 0; i < b.texels.size(); ++i)
+        if (b.meshOf(i) == "wall" && at(b.place(i))) walls.push_back(i);
+    Compared out;
+    double variance = 0;
+    for (size_t k = 0; k < points; ++k) {
+        const size_t i = walls[k * walls.size() / points];
+        // Averaged over the texel's own points, as the bake is.
+        double reference = 0;
+        const uint32_t n = b.texels.sampleCount(i);
+        for (uint32_t p = 0; p < n; ++p) {
+            const auto v = tracer.irradiance({b.texels.sample(i, p).position_m, b.normal(i)}, paths / n);
+            reference += static_cast<double>(v.irradiance_lux.y) / n;
+            variance += std::pow(static_cast<double>(v.standard_error_lux.y) / n, 2);
+        }
+        const double baked = inState(b, i, open, sets).y;
+        out.baked += baked;
+        out.reference += reference;
+        out.absolute += std::abs(baked - reference);
+    }
+    out.noise = std::sqrt(variance);
+    return out;
+}
+
+constexpr auto everywhere = [](glm::vec3) { return true; };
+
+BakeSettings exact() {
+    return {.series_rays = 512, .final_rays = 1024, .emitter_samples = 8, .tail_max = 1e-4f, .threshold = 0};
+}
+
+// Every one of the 32 states of three doors and two sets, every term kept, against the path tracer in a scene where
+// open doors are gone.
+TEST(Doors, EveryStateIsExactWithAllTermsKept) {
+    Scene scene = corridor();
+    scene.combinations = {{{true, 0}, {true, 1}, {true, 2}}};
+    BakedScene b(scene);
+    b.bake(exact());
+    double worst = 0, absolute = 0;
+    for (uint32_t open = 0; open < 8; ++open)
+        for (uint32_t sets = 0; sets < 4; ++sets) {
+            const Compared c = compare(b, scene, open, sets, 40, 768, everywhere);
+            // Four standard deviations of the reference's noise, and 2 % for the texels' size and the baker's own.
+            EXPECT_LE(std::abs(c.baked - c.reference), 4 * c.noise + 0.02 * c.reference) << open << " " << sets;
+            worst = std::max(worst, std::abs(c.baked / c.reference - 1));
+            absolute += c.absolute / c.reference / 32;
+        }
+    printf("32 states: worst sum off by %.2f %%, mean absolute difference %.2f %%\n", 100 * worst, 100 * absolute);
+}
+
+TEST(Doors, ClosedIsTheBaseAndWhatClosedLeavesReflect) {
+    BakedScene b(corridor());
+    b.bake({.series_rays = 32, .final_rays = 64, .emitter_samples = 2});
+    uint64_t crossed = 0, reflected = 0;
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        glm::dvec3 sum(0);
+        for (const ReceiverLight& l : b.baked.light.row(i)) {
+            crossed += !b.baked.terms[l.term].doors_open.empty();
+            reflected += !b.baked.terms[l.term].doors_closed.empty();
+            if (b.baked.terms[l.term].doors_open.empty()) sum += glm::dvec3(l.light.irradiance_lux);
+        }
+        EXPECT_EQ(inState(b, i, 0, 3), sum) << i;
+    }
+    EXPECT_GT(crossed, b.texels.size() / 4);
+    EXPECT_GT(reflected, b.texels.size() / 4);
+}
+
+// One leaf that closes a corridor at x = -1 and, open, stands across it at x = 1: light reaches the middle alone.
+Scene slidingDoor() {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f)), leaf = addMaterial(scene, lambert(0.8f));
+    addBox(scene, {3, 1, 1}, white);
+    scene.doors = {{"slides", true}};
+    addSolid(scene, "leaf", {-1, 0, 0}, {0.1f, 1, 1}, leaf, 0);
+    for (SceneMesh& mesh : scene.meshes)
+        if (mesh.door) mesh.open_from_closed[3] = {2, 0, 0, 1};
+    scene.light_sets = {{"lamp", 1}};
+    addPointLight(scene, {-2.2f, 0.2f, 0.1f}, 100, BakeMode::Indirect).light_set = 0;
+    return scene;
+}
+
+TEST(Doors, AnOpenPoseBlocksAndReflects) {
+    const Scene closed = slidingDoor();
+    Scene both = closed;
+    addOpenLeaves(both);
+    BakedScene b(both);
+    b.bake(exact());
+    const auto room = [](float from, float to) { return [=](glm::vec3 p) { return p.x > from && p.x < to; }; };
+    const auto left = room(-3, -1.15f), middle = room(-0.85f, 0.85f), right = room(1.15f, 3);
+    for (uint32_t open : {0u, 1u}) {
+        const Compared near = compare(b, closed, open, 1, 40, 4096, left);
+        EXPECT_NEAR(near.baked / near.reference, 1, 0.02 + 4 * near.noise / near.reference) << open;
+        // What an open door leaves of the room behind it: nothing at all, as the leaf stands across it.
+        EXPECT_EQ(compare(b, closed, open, 1, 40, 8, right).baked, 0) << open;
+    }
+    const Compared lit = compare(b, closed, 1, 1, 40, 4096, middle), dark = compare(b, closed, 0, 1, 40, 8, middle);
+    EXPECT_NEAR(lit.baked / lit.reference, 1, 0.02 + 4 * lit.noise / lit.reference);
+    EXPECT_GT(lit.baked, 0);
+    EXPECT_EQ(dark.baked, 0);
+}
+
+// A wall that a closed leaf covers is lit once the door is open.
+TEST(Doors, WhatAnOpeningUncoversIsLit) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addBox(scene, {2, 1, 1}, white);
+    scene.doors = {{"plug", false}};
+    addSolid(scene, "leaf", {1.5f, 0, 0}, {0.5f, 1, 1}, white, 0);
+    scene.light_sets = {{"lamp", 1}};
+    addPointLight(scene, {-1, 0.2f, 0.1f}, 100, BakeMode::Full).light_set = 0;
+    BakedScene b(scene);
+    b.bake(exact());
+    const auto covered = [](glm::vec3 p) { return p.x > 1.05f; };
+    const Compared open = compare(b, scene, 1, 1, 40, 2048, covered), closed = compare(b, scene, 0, 1, 40, 8, covered);
+    EXPECT_NEAR(open.baked / open.reference, 1, 0.02 + 4 * open.noise / open.reference);
+    EXPECT_EQ(closed.baked, 0);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
