@@ -2,6 +2,7 @@
 
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <update/device_places.h>
 
 #include <algorithm>
 #include <array>
@@ -137,9 +138,8 @@ void Kernel::bind(VkCommandBuffer commands, size_t pipeline) const {
 
 Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
                                         MemoryUse use) {
-    constexpr VkDeviceSize largest_texel_bytes = 16;
     TexelBuffer result;
-    auto buffer = createBuffer(vulkan, std::max(size_bytes, largest_texel_bytes),
+    auto buffer = createBuffer(vulkan, std::max<VkDeviceSize>(size_bytes, texel_buffer_bytes_min),
                                VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, use);
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     result.buffer = std::move(*buffer);

@@ -31,6 +31,7 @@ class Kernel {
                                    std::span<const Specialisation> pipelines);
 
     void bind(VkCommandBuffer commands, size_t pipeline) const;
+    uint32_t pipelineCount() const { return static_cast<uint32_t>(pipelines_.size()); }
     template <class Constants>
     void push(VkCommandBuffer commands, const Constants& constants) const {
         vkCmdPushConstants(commands, pipeline_layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(constants),

@@ -75,6 +75,7 @@ Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_
 
 Expected<GpuImage> createImage(const VulkanContext& vulkan, const VkImageCreateInfo& info) {
     GpuImage result;
+    result.size_bytes = VkDeviceSize{4} * info.extent.width * info.extent.height * info.arrayLayers;
     VkImage image = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateImage, vulkan.device, &info, nullptr, &image);
     result.image = ImageHandle(vulkan.device, image);

@@ -18,6 +18,7 @@ struct GpuBuffer {
 struct GpuImage {
     MemoryHandle memory;
     ImageHandle image;
+    VkDeviceSize size_bytes = 0;  // of its texels, of 4 bytes; alignment is not counted
 };
 
 enum class MemoryUse {

@@ -116,6 +116,10 @@ uint32_t GatherBlender::dispatch(VkCommandBuffer commands, const Planner&) const
     return 1;
 }
 
+uint64_t GatherBlender::deviceBytes() const {
+    return bytesOf({&addresses_, &base_, &payload_, &contributions_, &first_record_, &weights_});
+}
+
 Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, const PackData& data,
                                                 const LightmapPages& pages, Transfer& transfer) {
     constexpr uint64_t scratch_bytes = 32;
@@ -160,6 +164,10 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
     return blender;
+}
+
+uint64_t ScatterBlender::deviceBytes() const {
+    return bytesOf({&addresses_, &base_, &payload_, &receivers_of_records_}) + sums_.size_bytes;
 }
 
 uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& planner) const {

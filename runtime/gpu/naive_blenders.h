@@ -14,6 +14,8 @@ class GatherBlender : public TexelExecutor {
                                           Transfer& transfer);
     void write(const Planner& planner) override;
     uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
     TexelBuffer addresses_, base_, payload_, contributions_, first_record_, weights_;
@@ -28,6 +30,8 @@ class ScatterBlender : public TexelExecutor {
                                            const LightmapPages& pages, Transfer& transfer);
     void write(const Planner&) override {}  // weights are push constants
     uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
     struct Part {

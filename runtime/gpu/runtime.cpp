@@ -200,6 +200,15 @@ LightmapImages Runtime::images() const {
     return impl_->pages.images();
 }
 
+DeviceFootprint Runtime::footprint() const {
+    DeviceFootprint footprint{.bytes = impl_->pages.deviceBytes(), .pipelines = 0};
+    if (impl_->executor) {
+        footprint.bytes += impl_->executor->deviceBytes();
+        footprint.pipelines = impl_->executor->pipelineCount();
+    }
+    return footprint;
+}
+
 Expected<Runtime::Pages> Runtime::readPages() {
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));

@@ -4,6 +4,7 @@
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
 #include <spirv/blend_texels_comp.h>
+#include <update/device_places.h>
 
 #include <algorithm>
 #include <cstring>
@@ -22,45 +23,7 @@ struct DispatchConstants {
     uint32_t first_item, item_count;
 };
 
-// A lane loads two receivers at once, so every cluster starts at an even place, in receivers and in records.
-constexpr uint32_t padded(uint32_t receivers) {
-    return (receivers + 1) / 2 * 2;
-}
-
-// Where the device keeps what batches read: the pack's order, with gaps.
-struct Places {
-    std::vector<BatchPlace> batches;
-    std::vector<uint32_t> first_records;  // per cluster, of each of its contributions
-    uint32_t receivers = 0;
-    uint64_t records = 0;
-};
-
-Places placesOf(const PackData& data) {
-    std::vector<uint64_t> next(data.contributions.size() + 1, 0);
-    for (const Cluster& cluster : data.clusters)
-        for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
-            next[data.terms[t].contribution + 1] += padded(cluster.receiver_count);
-    for (size_t k = 1; k < next.size(); ++k) next[k] += next[k - 1];
-
-    Places places;
-    places.records = next.back();
-    for (const Cluster& cluster : data.clusters) {
-        const auto first_record = static_cast<uint32_t>(places.first_records.size());
-        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b) {
-            const uint32_t offset = data.batches[b].first_receiver - cluster.first_receiver;
-            places.batches.push_back({places.receivers + offset, data.batches[b].receiver_count, offset, first_record});
-        }
-        places.receivers += padded(cluster.receiver_count);
-        for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
-            uint64_t& first = next[data.terms[t].contribution];
-            places.first_records.push_back(static_cast<uint32_t>(first));
-            first += padded(cluster.receiver_count);
-        }
-    }
-    return places;
-}
-
-Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const Places& places, const Planner& planner) {
+Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places, const Planner& planner) {
     const uint64_t payload_bytes = places.records * sizeof(TexelRecord);
     const uint64_t base_bytes = uint64_t{places.receivers} * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
@@ -75,7 +38,7 @@ Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const Places& p
                             payload_bytes, base_bytes, work_bytes, bytes_max));
 }
 
-std::vector<Run> receiverRuns(const PackData& data, const Places& places) {
+std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) {
     std::vector<Run> runs;
     for (const Cluster& cluster : data.clusters)
         runs.push_back(
@@ -83,7 +46,7 @@ std::vector<Run> receiverRuns(const PackData& data, const Places& places) {
     return runs;
 }
 
-std::vector<Run> recordRuns(const PackData& data, const Places& places) {
+std::vector<Run> recordRuns(const PackData& data, const DevicePlaces& places) {
     std::vector<Run> runs;
     for (const Cluster& cluster : data.clusters)
         for (uint32_t t = 0; t < cluster.term_count; ++t)
@@ -132,7 +95,7 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     DIMMER_TRY(checkBatches(data));
-    const Places places = placesOf(data);
+    const DevicePlaces places = placesOf(data);
     DIMMER_TRY(checkLimits(properties.limits, places, planner));
 
     const auto receivers = receiverRuns(data, places), records = recordRuns(data, places);
@@ -169,6 +132,10 @@ Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planne
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
+}
+
+uint64_t TexelBlender::deviceBytes() const {
+    return bytesOf({&addresses_, &base_, &payload_, &work_, &terms_, &places_, &first_records_});
 }
 
 void TexelBlender::write(const Planner& planner) {

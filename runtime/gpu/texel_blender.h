@@ -17,6 +17,8 @@ class TexelBlender : public TexelExecutor {
 
     void write(const Planner& planner) override;
     uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,

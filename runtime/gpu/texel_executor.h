@@ -16,6 +16,9 @@ class TexelExecutor {
     virtual void write(const Planner& planner) = 0;
     // Records the dispatches, without barriers around them. Returns their number.
     virtual uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const = 0;
+
+    virtual uint64_t deviceBytes() const = 0;
+    virtual uint32_t pipelineCount() const = 0;
 };
 
 // Uploads what the mode needs (blocking). Unsupported where the device's limits are too small for the pack.

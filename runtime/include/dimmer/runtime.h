@@ -44,6 +44,12 @@ struct LightmapImages {
     uint32_t width = 0, height = 0, layers = 0;
 };
 
+// What a runtime keeps on the device between updates.
+struct DeviceFootprint {
+    uint64_t bytes = 0;      // memory of buffers and images; what drivers add to align it is not counted
+    uint32_t pipelines = 0;  // compute pipelines
+};
+
 // Not thread-safe; external synchronisation of the queue is the caller's, as in Vulkan itself.
 class Runtime : public LightState {
    public:
@@ -71,6 +77,9 @@ class Runtime : public LightState {
     Expected<UpdateStats> wait();
 
     LightmapImages images() const;
+    // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
+    // changes anything has its pages and nothing else.
+    DeviceFootprint footprint() const;
 
     // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime.
     struct Pages {
