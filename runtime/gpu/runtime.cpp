@@ -7,6 +7,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <optional>
@@ -39,7 +40,10 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
     VulkanContext vulkan;
-    LightmapPages pages;
+    std::vector<LightmapPages> pages;         // one set, or two that take turns
+    uint32_t page_sets = 1;                   // as asked for
+    uint32_t front = 0;                       // the set to sample
+    uint32_t target = 0;                      // the set that the last plan writes
     std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
@@ -51,17 +55,20 @@ struct Runtime::Impl {
     ~Impl() { (void)waitForSubmitted(); }
 
     Expected<void> create(const PackData& data, const Planner& planner, const RuntimeOptions& options);
+    Expected<void> createPages(const PackData& data, uint32_t count, Transfer& transfer);
+    VkQueue ownQueue() const { return vulkan.compute_queue ? vulkan.compute_queue : vulkan.queue; }
+    uint32_t ownFamily() const { return vulkan.compute_queue ? vulkan.compute_queue_family : vulkan.queue_family; }
     Expected<void> waitForSubmitted() const;
-    void recordUpdate(VkCommandBuffer commands, const Planner& planner);
-    Expected<void> submitUpdate(const Planner& planner);
+    void recordUpdate(VkCommandBuffer commands, const Planner& planner, bool drawing);
+    Expected<void> submitUpdate(const Planner& planner, const SubmitWait& wait);
 };
 
 Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const RuntimeOptions& options) {
     auto transfer = Transfer::create(vulkan, MemoryUse::Upload);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
-    auto made_pages = LightmapPages::create(vulkan, data, *transfer);
-    if (!made_pages) return std::unexpected(std::move(made_pages.error()));
-    pages = std::move(*made_pages);
+    // What never changes needs no second set.
+    const bool twice = options.buffering == Buffering::Double && !data.payload.empty();
+    DIMMER_TRY(createPages(data, twice ? 2 : 1, *transfer));
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
@@ -75,9 +82,18 @@ Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planne
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
         timer = std::move(*made_timer);
     }
-    auto made_commands = createCommandBuffer(vulkan);
+    auto made_commands = createCommandBuffer(vulkan.device, ownFamily());
     if (!made_commands) return std::unexpected(std::move(made_commands.error()));
     own = std::move(*made_commands);
+    return {};
+}
+
+Expected<void> Runtime::Impl::createPages(const PackData& data, uint32_t count, Transfer& transfer) {
+    for (uint32_t i = 0; i < count; ++i) {
+        auto made = LightmapPages::create(vulkan, data, transfer);
+        if (!made) return std::unexpected(std::move(made.error()));
+        pages.push_back(std::move(*made));
+    }
     return {};
 }
 
@@ -92,22 +108,22 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
     return {};
 }
 
-void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner) {
-    executor->write(planner);
+void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, bool drawing) {
+    executor->write(planner, target);
     if (timer) timer->reset(commands);
-    pages.beginWrites(commands);
+    pages[target].beginWrites(commands, drawing);
     if (timer) timer->begin(commands);
-    stats.dispatches = executor->dispatch(commands, planner);
+    stats.dispatches = executor->dispatch(commands, planner, target);
     if (timer) timer->end(commands);
-    pages.endWrites(commands);
+    pages[target].endWrites(commands, drawing);
     timed = timer.has_value();
 }
 
-Expected<void> Runtime::Impl::submitUpdate(const Planner& planner) {
+Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const SubmitWait& wait) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, planner);
+    recordUpdate(own.commands, planner, vulkan.compute_queue == VK_NULL_HANDLE);
     DIMMER_VK(vkEndCommandBuffer, own.commands);
 
     const VkSemaphore semaphore = timeline.get();
@@ -115,12 +131,18 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner) {
     auto values = vkStruct<VkTimelineSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO);
     values.signalSemaphoreValueCount = 1;
     values.pSignalSemaphoreValues = &value;
+    values.waitSemaphoreValueCount = wait.semaphore ? 1 : 0;
+    values.pWaitSemaphoreValues = &wait.value;
     auto info = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO, &values);
     info.commandBufferCount = 1;
     info.pCommandBuffers = &own.commands;
     info.signalSemaphoreCount = 1;
     info.pSignalSemaphores = &semaphore;
-    DIMMER_VK(vkQueueSubmit, vulkan.queue, 1, &info, VK_NULL_HANDLE);
+    const VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    info.waitSemaphoreCount = wait.semaphore ? 1 : 0;
+    info.pWaitSemaphores = &wait.semaphore;
+    info.pWaitDstStageMask = &stages;
+    DIMMER_VK(vkQueueSubmit, ownQueue(), 1, &info, VK_NULL_HANDLE);
     submitted = value;
     return {};
 }
@@ -129,50 +151,78 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     DIMMER_TRY(checkContext(vulkan));
     auto impl = std::make_unique<Impl>();
     impl->vulkan = vulkan;
+    impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
     Runtime runtime(pack, std::move(impl));
     DIMMER_TRY(runtime.impl_->create(pack.data(), runtime.planner(), options));
     return runtime;
 }
 
-Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl) : LightState(pack), impl_(std::move(impl)) {}
+Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl)
+    : LightState(pack, impl->page_sets), impl_(std::move(impl)) {}
 Runtime::~Runtime() = default;
 Runtime::Runtime(Runtime&&) noexcept = default;
 Runtime& Runtime::operator=(Runtime&&) noexcept = default;
 
+// Plans the next update of the pages that are to be written. False: there is nothing to execute.
+bool Runtime::planNext() {
+    Impl& impl = *impl_;
+    impl.timed = false;
+    impl.stats = {};
+    bool any = false;
+    if (impl.pages.size() == 1) {
+        any = planner().plan();
+    } else {
+        impl.target = impl.front ^ 1;
+        Planner& next = planner(impl.target);
+        if (next.waiting())
+            any = next.planWaiting();  // of one state to its end: a set of pages is shown when it is complete
+        else if (planner(impl.front).upToDate())
+            return false;
+        else
+            any = next.plan();
+        // The other pages may hold the state already, when it is one of before.
+        if (!any) impl.front = impl.target;
+    }
+    impl.stats = planner(impl.target).stats();
+    return any;
+}
+
+// What was planned has been sent or recorded.
+void Runtime::finish(double host_us) {
+    impl_->stats.host_us = host_us;
+    if (!planner(impl_->target).waiting()) impl_->front = impl_->target;
+}
+
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
     const auto start = std::chrono::steady_clock::now();
-    const bool any = planner().plan();
-    impl_->stats = planner().stats();
-    impl_->timed = false;
-    if (any) {
+    if (planNext()) {
         // An update that submit() sent may still be reading the work list.
         if (auto done = impl_->waitForSubmitted(); !done) {
-            planner().rollback();
+            planner(impl_->target).rollback();
             return std::unexpected(std::move(done.error()));
         }
-        impl_->recordUpdate(commands, planner());
+        impl_->recordUpdate(commands, planner(impl_->target), true);
+        finish(0);
     }
     impl_->stats.host_us = microsecondsSince(start);
     return impl_->stats;
 }
 
-Expected<UpdateStats> Runtime::submit() {
+Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     auto start = std::chrono::steady_clock::now();
-    const bool any = planner().plan();
-    impl_->stats = planner().stats();
-    impl_->timed = false;
-    impl_->stats.host_us = microsecondsSince(start);
+    const bool any = planNext();
+    const double planning_us = impl_->stats.host_us = microsecondsSince(start);
     if (!any) return impl_->stats;
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
-    if (sent) sent = impl_->submitUpdate(planner());
+    if (sent) sent = impl_->submitUpdate(planner(impl_->target), wait);
     if (!sent) {
-        planner().rollback();
+        planner(impl_->target).rollback();
         impl_->timed = false;
         return std::unexpected(std::move(sent.error()));
     }
-    impl_->stats.host_us += microsecondsSince(start);
+    finish(planning_us + microsecondsSince(start));
     return impl_->stats;
 }
 
@@ -196,12 +246,16 @@ Expected<UpdateStats> Runtime::wait() {
     return impl_->stats;
 }
 
-LightmapImages Runtime::images() const {
-    return impl_->pages.images();
+LightmapImages Runtime::images(uint32_t page_set) const {
+    return impl_->pages[std::min<size_t>(page_set, impl_->pages.size() - 1)].images();
+}
+uint32_t Runtime::pageSet() const {
+    return impl_->front;
 }
 
 DeviceFootprint Runtime::footprint() const {
-    DeviceFootprint footprint{.bytes = impl_->pages.deviceBytes(), .pipelines = 0};
+    DeviceFootprint footprint;
+    for (const LightmapPages& pages : impl_->pages) footprint.bytes += pages.deviceBytes();
     if (impl_->executor) {
         footprint.bytes += impl_->executor->deviceBytes();
         footprint.pipelines = impl_->executor->pipelineCount();
@@ -210,9 +264,10 @@ DeviceFootprint Runtime::footprint() const {
 }
 
 Expected<Runtime::Pages> Runtime::readPages() {
+    DIMMER_TRY(impl_->waitForSubmitted());  // perhaps on another queue
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
-    return impl_->pages.read(*transfer);
+    return impl_->pages[impl_->front].read(*transfer);
 }
 
 }  // namespace dimmer

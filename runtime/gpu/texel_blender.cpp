@@ -60,6 +60,12 @@ Specialisation specialisationOf(uint32_t group) {
     return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size};
 }
 
+Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
+    if (!made) return std::unexpected(std::move(made.error()));
+    slot = std::move(*made);
+    return {};
+}
+
 // Pairs of receivers must not straddle batches.
 Expected<void> checkBatches(const PackData& data) {
     for (const Cluster& cluster : data.clusters)
@@ -74,30 +80,23 @@ Expected<void> checkBatches(const PackData& data) {
 }  // namespace
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                            const LightmapPages& pages, Transfer& transfer, bool per_combination) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    TexelBlender blender;
-    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
-    blender.per_combination_ = per_combination;
-    DIMMER_TRY(blender.createTables(vulkan, data, planner, transfer));
-    DIMMER_TRY(blender.createKernel(vulkan.device, planner, pages));
-    return blender;
-}
-
-Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                          Transfer& transfer) {
-    auto keep = [](Expected<TexelBuffer> made, TexelBuffer& slot) -> Expected<void> {
-        if (!made) return std::unexpected(std::move(made.error()));
-        slot = std::move(*made);
-        return {};
-    };
+                                            std::span<const LightmapPages> page_sets, Transfer& transfer,
+                                            bool per_combination) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     DIMMER_TRY(checkBatches(data));
-    const DevicePlaces places = placesOf(data);
-    DIMMER_TRY(checkLimits(properties.limits, places, planner));
+    DIMMER_TRY(checkLimits(properties.limits, placesOf(data), planner));
+    TexelBlender blender;
+    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    blender.per_combination_ = per_combination;
+    DIMMER_TRY(blender.createTables(vulkan, data, transfer));
+    for (size_t i = 0; i < page_sets.size(); ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
+    DIMMER_TRY(blender.createKernel(vulkan.device, planner, page_sets));
+    return blender;
+}
 
+Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
+    const DevicePlaces places = placesOf(data);
     const auto receivers = receiverRuns(data, places), records = recordRuns(data, places);
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(uint32_t), address_format,
                                 fillFrom(receivers, [&](uint32_t i) { return data.addresses[i]; })),
@@ -109,40 +108,57 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
                                 fillFrom(records, [&](uint32_t i) { return canonical(data.payload[i]); })),
                     payload_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.first_records, VK_FORMAT_R32_UINT), first_records_));
-    DIMMER_TRY(
-        keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload), work_));
-    return keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-                terms_);
+    return keep(uploadTable(vulkan, transfer, places.first_records, VK_FORMAT_R32_UINT), first_records_);
 }
 
-Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planner, const LightmapPages& pages) {
+Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
+    Work work;
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
+                    work.items));
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
+                    work.terms));
+    work_.push_back(std::move(work));
+    return {};
+}
+
+Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planner,
+                                          std::span<const LightmapPages> page_sets) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
         pipelines.push_back(specialisationOf(group));
-    const KernelBinding bindings[] = {
-        KernelBinding::ofTexels(addresses_.view.get()),       KernelBinding::ofTexels(base_.view.get()),
-        KernelBinding::ofTexels(payload_.view.get()),         KernelBinding::ofTexels(work_.view.get()),
-        KernelBinding::ofTexels(terms_.view.get()),           KernelBinding::ofTexels(places_.view.get()),
-        KernelBinding::ofTexels(first_records_.view.get()),   KernelBinding::ofImage(pages.irradianceStorageView()),
-        KernelBinding::ofImage(pages.directionStorageView()),
-    };
-    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchConstants), pipelines);
+    std::vector<KernelBinding> bindings;
+    for (size_t i = 0; i < page_sets.size(); ++i)
+        bindings.insert(bindings.end(), {
+                                            KernelBinding::ofTexels(addresses_.view.get()),
+                                            KernelBinding::ofTexels(base_.view.get()),
+                                            KernelBinding::ofTexels(payload_.view.get()),
+                                            KernelBinding::ofTexels(work_[i].items.view.get()),
+                                            KernelBinding::ofTexels(work_[i].terms.view.get()),
+                                            KernelBinding::ofTexels(places_.view.get()),
+                                            KernelBinding::ofTexels(first_records_.view.get()),
+                                            KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
+                                            KernelBinding::ofImage(page_sets[i].directionStorageView()),
+                                        });
+    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchConstants), pipelines,
+                                 static_cast<uint32_t>(page_sets.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
 }
 
 uint64_t TexelBlender::deviceBytes() const {
-    return bytesOf({&addresses_, &base_, &payload_, &work_, &terms_, &places_, &first_records_});
+    uint64_t bytes = bytesOf({&addresses_, &base_, &payload_, &places_, &first_records_});
+    for (const Work& work : work_) bytes += bytesOf({&work.items, &work.terms});
+    return bytes;
 }
 
-void TexelBlender::write(const Planner& planner) {
+void TexelBlender::write(const Planner& planner, uint32_t page_set) {
     const WorkList& work = planner.work();
-    std::memcpy(work_.buffer.mapped, work.items.data(), work.items.size_bytes());
+    const Work& target = work_[page_set];
+    std::memcpy(target.items.buffer.mapped, work.items.data(), work.items.size_bytes());
     // Everything may be off: an empty span's data is not for memcpy.
-    if (!work.terms.empty()) std::memcpy(terms_.buffer.mapped, work.terms.data(), work.terms.size_bytes());
+    if (!work.terms.empty()) std::memcpy(target.terms.buffer.mapped, work.terms.data(), work.terms.size_bytes());
 }
 
 void TexelBlender::recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const {
@@ -167,12 +183,12 @@ uint32_t TexelBlender::dispatchGroup(VkCommandBuffer commands, const WorkList& w
     return dispatches;
 }
 
-uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner) const {
+uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const {
     const WorkList& work = planner.work();
     uint32_t dispatches = 0;
     for (uint32_t i = 0; i < work_group_count; ++i) {
         if (work.groups[i].item_count == 0) continue;
-        kernel_.bind(commands, i);
+        kernel_.bind(commands, i, page_set);
         dispatches += dispatchGroup(commands, work, work.groups[i]);
     }
     return dispatches;

@@ -16,17 +16,19 @@ Expected<std::unique_ptr<TexelExecutor>> boxed(Expected<T> made) {
 
 Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, UpdateMode mode,
                                                         const PackData& data, const Planner& planner,
-                                                        const LightmapPages& pages, Transfer& transfer) {
+                                                        std::span<const LightmapPages> page_sets, Transfer& transfer) {
+    if (page_sets.size() > 1 && (mode == UpdateMode::Gather || mode == UpdateMode::Scatter))
+        return fail(ErrorCode::Unsupported, "Modes gather and scatter update pages in place only.");
     switch (mode) {
         case UpdateMode::Gather:
-            return boxed(GatherBlender::create(vulkan, data, pages, transfer));
+            return boxed(GatherBlender::create(vulkan, data, page_sets.front(), transfer));
         case UpdateMode::Scatter:
-            return boxed(ScatterBlender::create(vulkan, data, pages, transfer));
+            return boxed(ScatterBlender::create(vulkan, data, page_sets.front(), transfer));
         case UpdateMode::WorkList:
         case UpdateMode::PerCombination:
             break;
     }
-    return boxed(TexelBlender::create(vulkan, data, planner, pages, transfer, mode == UpdateMode::PerCombination));
+    return boxed(TexelBlender::create(vulkan, data, planner, page_sets, transfer, mode == UpdateMode::PerCombination));
 }
 
 }  // namespace dimmer

@@ -37,6 +37,6 @@ struct CommandBuffer {
     CommandPoolHandle pool;
     VkCommandBuffer commands = VK_NULL_HANDLE;
 };
-Expected<CommandBuffer> createCommandBuffer(const VulkanContext& vulkan);
+Expected<CommandBuffer> createCommandBuffer(VkDevice device, uint32_t queue_family);
 
 }  // namespace dimmer

@@ -91,10 +91,17 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 
 }  // namespace
 
-LightState::LightState(const Pack& pack) : pack_(pack), planner_(std::make_unique<Planner>(pack_.data())) {}
+LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack) {
+    const auto tables = std::make_shared<const PlanTables>(pack_.data());
+    for (uint32_t i = 0; i < page_sets; ++i) planners_.push_back(std::make_unique<Planner>(pack_.data(), tables));
+}
 LightState::~LightState() = default;
 LightState::LightState(LightState&&) noexcept = default;
 LightState& LightState::operator=(LightState&&) noexcept = default;
+
+void LightState::setElement(uint32_t element, Weight weight) {
+    for (auto& planner : planners_) planner->setElement(element, normalised(weight));
+}
 
 Expected<LightSet> LightState::lightSet(std::string_view name) const {
     const auto index = lookUp(pack_.elements(), ElementKind::LightSet, name);
@@ -111,14 +118,14 @@ Expected<Door> LightState::door(std::string_view name) const {
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::LightSet, set.element); !ok) return ok;
     if (auto ok = checkWeight(pack_.elements()[set.element], weight); !ok) return ok;
-    planner_->setElement(set.element, normalised(weight));
+    setElement(set.element, weight);
     return {};
 }
 
 Expected<void> LightState::setDoor(Door door, float open) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::Door, door.element); !ok) return ok;
     if (auto ok = checkOpen(pack_.elements()[door.element], open); !ok) return ok;
-    planner_->setElement(door.element, normalised(Weight(open)));
+    setElement(door.element, Weight(open));
     return {};
 }
 
@@ -140,17 +147,26 @@ Expected<void> LightState::apply(std::string_view state) {
         if (assignment.target == StateAssignment::Target::AllSets) continue;
         if (auto ok = resolve(elements, assignment, changes); !ok) return ok;
     }
-    for (const ElementChange& change : changes) planner_->setElement(change.element, normalised(change.weight));
+    for (const ElementChange& change : changes) setElement(change.element, change.weight);
+    return {};
+}
+
+Expected<void> LightState::setLimits(const UpdateLimits& limits) {
+    if (!(limits.tolerance_quanta >= 0 && std::isfinite(limits.tolerance_quanta)))
+        return fail(
+            ErrorCode::InvalidArgument,
+            fmt::format("A tolerance of {} quanta is neither 0 nor a positive number.", limits.tolerance_quanta));
+    for (auto& planner : planners_) planner->setLimits(limits);
     return {};
 }
 
 // A handle of another pack has no weight here; 0 is the harmless answer.
 Weight LightState::weight(LightSet set) const {
-    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner_->element(set.element) : 0.0f;
+    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner().element(set.element) : 0.0f;
 }
 
 float LightState::open(Door door) const {
-    return checkHandle(pack_.elements(), ElementKind::Door, door.element) ? planner_->element(door.element).r : 0.0f;
+    return checkHandle(pack_.elements(), ElementKind::Door, door.element) ? planner().element(door.element).r : 0.0f;
 }
 
 }  // namespace dimmer

@@ -20,6 +20,14 @@ dimmer::Expected<dimmer::Runtime> loadLights(const dimmer::VulkanContext& vulkan
 }
 // end snippet
 
+dimmer::Expected<void> limitUpdates(dimmer::Runtime& lights) {
+    // snippet: limits
+    // At most 200,000 texels per update, the most visible first; and leave what is less than half a step of the format.
+    if (auto ok = lights.setLimits({.receivers_max = 200000, .tolerance_quanta = 0.5f}); !ok) return ok;
+    // end snippet
+    return {};
+}
+
 size_t uploaded = 0;
 void upload(const std::string&, const std::vector<MeshVertex>& vertices, const std::vector<uint32_t>&, uint32_t) {
     uploaded += vertices.size();
@@ -141,6 +149,7 @@ TEST_F(SnippetsGpu, LoadChangeAndUpdate) {
         ASSERT_TRUE(stats.has_value());
         EXPECT_EQ(stats->dispatches > 0, first);
     }
+    ASSERT_TRUE(limitUpdates(*lights).has_value());
     ASSERT_TRUE(lights->apply("all=1"));
     const auto sent = submit(*lights);
     ASSERT_TRUE(sent.has_value());
@@ -209,7 +218,7 @@ std::map<std::string, std::string> quotesOf(const std::string& document) {
 TEST(Snippets, DocumentsQuoteThem) {
     const std::filesystem::path root = DIMMER_SOURCE_DIR;
     auto snippets = snippetsOf(readText(root / "tests/app/snippets_test.cpp"));
-    ASSERT_EQ(snippets.size(), 7u);
+    ASSERT_EQ(snippets.size(), 8u);
     for (const char* document : {"README.md", "docs/integrate.md"}) {
         const auto quotes = quotesOf(readText(root / document));
         EXPECT_FALSE(quotes.empty()) << document;

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 namespace dimmer {
 
@@ -29,6 +30,18 @@ struct Weight {
     bool operator==(const Weight&) const = default;
 };
 
+// What an update may leave for later. In every case the pages end up exactly as the weights say, once changes stop
+// (and the tolerance is 0).
+struct UpdateLimits {
+    // Receivers that one update writes at most, in whole batches of up to 64; 0: no limit. The most visible changes
+    // come first, and what waits counts for more with every update.
+    uint32_t receivers_max = 0;
+    // A cluster of receivers is left as it is while none of their stored irradiances is further from what the weights
+    // say than so many steps of the format, counted from what was last written. At 0.5 the stored value is one step off
+    // at most. 0: everything is written.
+    float tolerance_quanta = 0;
+};
+
 // Not thread-safe: call from one thread at a time. Nothing here touches a GPU; a change costs nanoseconds and takes
 // effect with the runtime's next update. At the start every set has weight 1 (its maximum, where that is
 // smaller) and every door is closed.
@@ -48,19 +61,25 @@ class LightState {
     // All at once, e.g. "hall=0.5,alarm=1/0.2/0.2,door:front=1"; "all=0" sets every light set first, wherever it is
     // written. What is not named keeps its weight. On an error nothing has changed.
     Expected<void> apply(std::string_view state);
+    // Takes effect with the next update; 0 and 0 bring the exact state with it. The first call that sets a limit costs
+    // a pass over the pack's records. Refused: a tolerance that is negative or not finite.
+    Expected<void> setLimits(const UpdateLimits& limits);
 
     Weight weight(LightSet set) const;
     float open(Door door) const;
     const Pack& pack() const { return pack_; }
 
    protected:
-    explicit LightState(const Pack& pack);
-    Planner& planner() { return *planner_; }
-    const Planner& planner() const { return *planner_; }
+    // One planner per set of pages: each knows what its own pages have yet to catch up on.
+    explicit LightState(const Pack& pack, uint32_t page_sets = 1);
+    Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }
+    const Planner& planner(uint32_t page_set = 0) const { return *planners_[page_set]; }
 
    private:
+    void setElement(uint32_t element, Weight weight);
+
     Pack pack_;
-    std::unique_ptr<Planner> planner_;
+    std::vector<std::unique_ptr<Planner>> planners_;
 };
 
 // What one update touched. Bytes are those that the kernels read and write, by count of records.
@@ -70,6 +89,8 @@ struct UpdateStats {
     uint32_t batches = 0;
     uint64_t receivers = 0;
     uint32_t dispatches = 0;
+    uint32_t clusters_put_off = 0;   // by UpdateLimits::tolerance_quanta
+    uint64_t receivers_waiting = 0;  // left for later updates by UpdateLimits::receivers_max, at most
     uint64_t bytes_read = 0;
     uint64_t bytes_written = 0;
     double host_us = 0;  // planning and recording

@@ -18,6 +18,10 @@ struct VulkanContext {
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
     uint32_t queue_family = 0;
+    // Optional: a queue with compute on which submit() runs beside the other, of the same family or another one (then
+    // pages and records are shared concurrently between the two).
+    VkQueue compute_queue = VK_NULL_HANDLE;
+    uint32_t compute_queue_family = 0;
 };
 
 // How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
@@ -28,8 +32,16 @@ enum class UpdateMode {
     Scatter,         // one pass per contribution over 32-bit sums; all texels whenever anything changed
 };
 
+enum class Buffering {
+    InPlace,  // updates write the pages that frames sample; the barriers are in the caller's frame
+    // Updates write a second set of pages, which takes the first one's place when it is complete, so that frames in
+    // flight go on reading the old light. Twice the memory for pages.
+    Double,
+};
+
 struct RuntimeOptions {
     UpdateMode mode = UpdateMode::WorkList;
+    Buffering buffering = Buffering::InPlace;
     // Write GPU timestamps around each update, read by stats(). Off costs nothing.
     bool timestamps = true;
 };
@@ -42,6 +54,12 @@ struct LightmapImages {
     VkImageView direction_view = VK_NULL_HANDLE;
     VkSampler sampler = VK_NULL_HANDLE;  // bilinear, clamp to edge
     uint32_t width = 0, height = 0, layers = 0;
+};
+
+// What an update of submit() waits for: a semaphore that says that the frames which sampled the pages are done.
+struct SubmitWait {
+    VkSemaphore semaphore = VK_NULL_HANDLE;  // null: nothing
+    uint64_t value = 0;                      // for a timeline semaphore
 };
 
 // What a runtime keeps on the device between updates.
@@ -62,13 +80,14 @@ class Runtime : public LightState {
 
     // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
     // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. Nothing
-    // changed: records nothing. One recording may be in flight at a time: before the next, the earlier submission
-    // must have completed on the GPU.
+    // changed: records nothing. One recording for each set of pages may be in flight: before the next, the earlier
+    // submission must have completed on the GPU.
     Expected<UpdateStats> record(VkCommandBuffer commands);
 
-    // The same on the context's queue, with a command buffer of the runtime's own. Returns at once; a later call waits
-    // for the earlier update. Nothing changed: no submission.
-    Expected<UpdateStats> submit();
+    // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
+    // own. Returns at once; a later call waits for the earlier update. Nothing changed: no submission, and no wait.
+    // Where the pages to write were sampled on another queue, `wait` must say when that is done.
+    Expected<UpdateStats> submit(const SubmitWait& wait = {});
     // The timeline semaphore of submit() and the value that its last submission signals.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
@@ -76,7 +95,11 @@ class Runtime : public LightState {
     // it once the commands have completed.
     Expected<UpdateStats> wait();
 
-    LightmapImages images() const;
+    // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns; the
+    // other set is pageSet() ^ 1, for descriptors that are written once.
+    LightmapImages images() const { return images(pageSet()); }
+    LightmapImages images(uint32_t page_set) const;
+    uint32_t pageSet() const;
     // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
     // changes anything has its pages and nothing else.
     DeviceFootprint footprint() const;
@@ -90,6 +113,8 @@ class Runtime : public LightState {
    private:
     struct Impl;
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl);
+    bool planNext();
+    void finish(double host_us);
     std::unique_ptr<Impl> impl_;
 };
 
