@@ -37,7 +37,7 @@ void blendBatch(const WorkItem& item, std::span<const WorkTerm> terms, const Pac
     Sums sums{};
     add(sums, records.data(), batch.receiver_count, weight_scale, weight_scale, weight_scale);
     for (const WorkTerm& term : terms) {
-        const uint32_t first = data.terms[cluster.first_term + term.slot].first_record;
+        const uint32_t first = data.terms[term.term].first_record;
         add(sums, &data.payload[first + (batch.first_receiver - cluster.first_receiver)], batch.receiver_count,
             term.weight_r, term.weight_g, term.weight_b);
     }

@@ -1,6 +1,7 @@
 #include <dimmer/runtime.h>
 
 #include <gpu/lightmap_pages.h>
+#include <gpu/record_loader.h>
 #include <gpu/texel_blender.h>
 #include <gpu/texel_executor.h>
 #include <gpu/update_timer.h>
@@ -37,6 +38,13 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
 
 }  // namespace
 
+// visit(k) for the contributions of a light set that are stored anywhere.
+template <class Visit>
+void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
+    for (uint32_t k = 0; k < data.contributions.size(); ++k)
+        if (data.contributions[k].light_set == set.element && data.contributions[k].receivers > 0) visit(k);
+}
+
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
     VulkanContext vulkan;
@@ -45,6 +53,9 @@ struct Runtime::Impl {
     uint32_t front = 0;                       // the set to sample
     uint32_t target = 0;                      // the set that the last plan writes
     std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
+    std::optional<RecordLoader> loader;       // none in modes that load nothing later
+    std::vector<LightSet> loading;            // sets whose records are on their way
+    std::vector<RecordsState> records;        // per element
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
     SemaphoreHandle timeline;
@@ -74,9 +85,10 @@ Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planne
     timeline = std::move(*made_timeline);
     if (data.payload.empty()) return {};  // nothing can ever change
 
-    auto made_executor = createExecutor(vulkan, options.mode, data, planner, pages, *transfer);
+    auto made_executor = createExecutor(vulkan, options, data, planner, pages, *transfer);
     if (!made_executor) return std::unexpected(std::move(made_executor.error()));
     executor = std::move(*made_executor);
+    if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
     if (options.timestamps) {
         auto made_timer = UpdateTimer::create(vulkan);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
@@ -152,8 +164,11 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     auto impl = std::make_unique<Impl>();
     impl->vulkan = vulkan;
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
+    impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
     Runtime runtime(pack, std::move(impl));
-    DIMMER_TRY(runtime.impl_->create(pack.data(), runtime.planner(), options));
+    DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(), options));
+    for (uint32_t i = 0; i < pack.elements().size() && !options.load_records; ++i)
+        if (pack.elements()[i].kind == ElementKind::LightSet) runtime.hold(LightSet{i}, true);
     return runtime;
 }
 
@@ -246,6 +261,68 @@ Expected<UpdateStats> Runtime::wait() {
     return impl_->stats;
 }
 
+Expected<void> Runtime::checkLoadable(LightSet set) const {
+    DIMMER_TRY(checkSet(set));
+    if (impl_->executor && !impl_->executor->records())
+        return fail(ErrorCode::Unsupported, "Modes gather and scatter keep all records loaded.");
+    return {};
+}
+
+Expected<void> Runtime::dropRecords(LightSet set) {
+    DIMMER_TRY(checkLoadable(set));
+    hold(set, true);
+    impl_->records[set.element] = RecordsState::Dropped;
+    std::erase_if(impl_->loading, [&](LightSet other) { return other.element == set.element; });
+    forEachContribution(pack().data(), set, [&](uint32_t k) {
+        impl_->loader->cancel(k);
+        impl_->executor->records()->release(k);
+    });
+    return {};
+}
+
+Expected<void> Runtime::loadRecords(LightSet set) {
+    DIMMER_TRY(checkLoadable(set));
+    if (impl_->records[set.element] != RecordsState::Dropped) return {};
+    Expected<void> room;
+    forEachContribution(pack().data(), set, [&](uint32_t k) {
+        if (room) room = impl_->executor->records()->reserve(k);
+    });
+    if (!room) {
+        forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->executor->records()->release(k); });
+        return room;
+    }
+    forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->loader->add(k, *impl_->executor->records()); });
+    impl_->records[set.element] = RecordsState::Loading;
+    impl_->loading.push_back(set);
+    return {};
+}
+
+RecordsState Runtime::recordsState(LightSet set) const {
+    return checkSet(set) ? impl_->records[set.element] : RecordsState::Dropped;
+}
+
+// Sets of which nothing is on its way any more.
+void Runtime::finishLoading() {
+    std::erase_if(impl_->loading, [&](LightSet set) {
+        bool pending = false;
+        forEachContribution(pack().data(), set, [&](uint32_t k) { pending |= impl_->loader->pending(k); });
+        if (pending) return false;
+        impl_->records[set.element] = RecordsState::Loaded;
+        hold(set, false);
+        return true;
+    });
+}
+
+Expected<LoadProgress> Runtime::continueLoading(uint64_t bytes_max) {
+    if (!impl_->loader) {  // nothing is stored of any set
+        finishLoading();
+        return LoadProgress{};
+    }
+    DIMMER_TRY(impl_->loader->step(*impl_->executor->records(), bytes_max));
+    finishLoading();
+    return impl_->loader->progress();
+}
+
 LightmapImages Runtime::images(uint32_t page_set) const {
     return impl_->pages[std::min<size_t>(page_set, impl_->pages.size() - 1)].images();
 }
@@ -258,6 +335,7 @@ DeviceFootprint Runtime::footprint() const {
     for (const LightmapPages& pages : impl_->pages) footprint.bytes += pages.deviceBytes();
     if (impl_->executor) {
         footprint.bytes += impl_->executor->deviceBytes();
+        if (impl_->loader) footprint.bytes += impl_->loader->deviceBytes();
         footprint.pipelines = impl_->executor->pipelineCount();
     }
     return footprint;

@@ -28,9 +28,7 @@ Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePla
     const uint64_t base_bytes = uint64_t{places.receivers} * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
     const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
-    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max &&
-        places.first_records.size() <= limits.maxTexelBufferElements)
-        return {};
+    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
     return fail(ErrorCode::Unsupported,
                 fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
                             "exceeds what this Vulkan device reads as one texel buffer, {} bytes. Cook with fewer "
@@ -43,16 +41,6 @@ std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) 
     for (const Cluster& cluster : data.clusters)
         runs.push_back(
             {places.batches[cluster.first_batch].first_receiver, cluster.first_receiver, cluster.receiver_count});
-    return runs;
-}
-
-std::vector<Run> recordRuns(const PackData& data, const DevicePlaces& places) {
-    std::vector<Run> runs;
-    for (const Cluster& cluster : data.clusters)
-        for (uint32_t t = 0; t < cluster.term_count; ++t)
-            runs.push_back({places.first_records[places.batches[cluster.first_batch].first_record + t],
-                            data.terms[cluster.first_term + t].first_record, cluster.receiver_count});
-    std::ranges::sort(runs, {}, &Run::to);
     return runs;
 }
 
@@ -81,14 +69,18 @@ Expected<void> checkBatches(const PackData& data) {
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             std::span<const LightmapPages> page_sets, Transfer& transfer,
-                                            bool per_combination) {
+                                            const RuntimeOptions& options) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     DIMMER_TRY(checkBatches(data));
     DIMMER_TRY(checkLimits(properties.limits, placesOf(data), planner));
     TexelBlender blender;
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
-    blender.per_combination_ = per_combination;
+    blender.per_combination_ = options.mode == UpdateMode::PerCombination;
+    auto records = RecordStore::create(vulkan, data, options.records_bytes_max);
+    if (!records) return std::unexpected(std::move(records.error()));
+    blender.records_ = std::move(*records);
+    DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
     for (size_t i = 0; i < page_sets.size(); ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
     DIMMER_TRY(blender.createKernel(vulkan.device, planner, page_sets));
@@ -97,18 +89,27 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
 
 Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
     const DevicePlaces places = placesOf(data);
-    const auto receivers = receiverRuns(data, places), records = recordRuns(data, places);
+    const auto receivers = receiverRuns(data, places);
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(uint32_t), address_format,
                                 fillFrom(receivers, [&](uint32_t i) { return data.addresses[i]; })),
                     addresses_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),
                     base_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.records * sizeof(TexelRecord), wide_format,
-                                fillFrom(records, [&](uint32_t i) { return canonical(data.payload[i]); })),
-                    payload_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_));
-    return keep(uploadTable(vulkan, transfer, places.first_records, VK_FORMAT_R32_UINT), first_records_);
+    return keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_);
+}
+
+// Of every contribution, or of those without a light set, which nothing can load later.
+Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& transfer, bool all) {
+    for (uint32_t k = 0; k < data.contributions.size(); ++k) {
+        if (!all && data.contributions[k].light_set) continue;
+        DIMMER_TRY(records_.reserve(k));
+        DIMMER_TRY(transfer.upload(
+            records_.buffer(), records_.byteCount(k),
+            [&](VkDeviceSize offset, std::span<std::byte> piece) { records_.fill(k, offset, piece); },
+            records_.firstByte(k)));
+    }
+    return {};
 }
 
 Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
@@ -132,11 +133,10 @@ Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planne
         bindings.insert(bindings.end(), {
                                             KernelBinding::ofTexels(addresses_.view.get()),
                                             KernelBinding::ofTexels(base_.view.get()),
-                                            KernelBinding::ofTexels(payload_.view.get()),
+                                            KernelBinding::ofTexels(records_.view()),
                                             KernelBinding::ofTexels(work_[i].items.view.get()),
                                             KernelBinding::ofTexels(work_[i].terms.view.get()),
                                             KernelBinding::ofTexels(places_.view.get()),
-                                            KernelBinding::ofTexels(first_records_.view.get()),
                                             KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
                                             KernelBinding::ofImage(page_sets[i].directionStorageView()),
                                         });
@@ -148,7 +148,7 @@ Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planne
 }
 
 uint64_t TexelBlender::deviceBytes() const {
-    uint64_t bytes = bytesOf({&addresses_, &base_, &payload_, &places_, &first_records_});
+    uint64_t bytes = bytesOf({&addresses_, &base_, &places_}) + records_.deviceBytes();
     for (const Work& work : work_) bytes += bytesOf({&work.items, &work.terms});
     return bytes;
 }
@@ -157,8 +157,9 @@ void TexelBlender::write(const Planner& planner, uint32_t page_set) {
     const WorkList& work = planner.work();
     const Work& target = work_[page_set];
     std::memcpy(target.items.buffer.mapped, work.items.data(), work.items.size_bytes());
-    // Everything may be off: an empty span's data is not for memcpy.
-    if (!work.terms.empty()) std::memcpy(target.terms.buffer.mapped, work.terms.data(), work.terms.size_bytes());
+    auto* terms = reinterpret_cast<WorkTerm*>(target.terms.buffer.mapped);
+    for (const WorkTerm& term : work.terms)
+        *terms++ = {records_.firstRecord(term.term), term.weight_r, term.weight_g, term.weight_b};
 }
 
 void TexelBlender::recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const {

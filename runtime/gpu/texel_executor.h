@@ -9,6 +9,8 @@
 
 namespace dimmer {
 
+class RecordStore;
+
 class TexelExecutor {
    public:
     virtual ~TexelExecutor() = default;
@@ -21,11 +23,13 @@ class TexelExecutor {
 
     virtual uint64_t deviceBytes() const = 0;
     virtual uint32_t pipelineCount() const = 0;
+    // Whose ranges may be loaded and dropped; null in modes that keep records in an order of their own.
+    virtual RecordStore* records() { return nullptr; }
 };
 
 // Uploads what the mode needs (blocking), to write any of the given sets of pages. Unsupported where the device's
 // limits are too small for the pack, and for several sets in modes that are there to compare with.
-Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, UpdateMode mode,
+Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, const RuntimeOptions& options,
                                                         const PackData& data, const Planner& planner,
                                                         std::span<const LightmapPages> page_sets, Transfer& transfer);
 

@@ -64,12 +64,13 @@ Expected<void> Transfer::run(const std::function<void(VkCommandBuffer)>& record)
 }
 
 Expected<void> Transfer::upload(VkBuffer target, VkDeviceSize size_bytes,
-                                const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill) {
+                                const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill,
+                                VkDeviceSize target_offset) {
     for (VkDeviceSize offset = 0; offset < size_bytes; offset += staging_bytes) {
         const VkDeviceSize piece_bytes = std::min(staging_bytes, size_bytes - offset);
         fill(offset, std::span(staging_.mapped, piece_bytes));
         DIMMER_TRY(run([&](VkCommandBuffer commands) {
-            const VkBufferCopy region{.srcOffset = 0, .dstOffset = offset, .size = piece_bytes};
+            const VkBufferCopy region{.srcOffset = 0, .dstOffset = target_offset + offset, .size = piece_bytes};
             vkCmdCopyBuffer(commands, staging_.buffer.get(), target, 1, &region);
             // To whatever later submissions of any kind read.
             auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);

@@ -10,11 +10,14 @@ namespace dimmer {
 
 // The pack's order, with gaps: a lane loads two receivers at once, so every cluster starts at an even place, in
 // receivers and in records.
+constexpr uint32_t paddedReceivers(uint32_t receivers) {
+    return (receivers + 1) / 2 * 2;
+}
+
 struct DevicePlaces {
     std::vector<BatchPlace> batches;
-    std::vector<uint32_t> first_records;  // per cluster, of each of its contributions
-    uint32_t receivers = 0;               // gaps included
-    uint64_t records = 0;                 // likewise
+    uint32_t receivers = 0;  // gaps included
+    uint64_t records = 0;    // likewise
 };
 
 DevicePlaces placesOf(const PackData& data);

@@ -91,7 +91,7 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 
 }  // namespace
 
-LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack) {
+LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack), held_(pack.elements().size()) {
     const auto tables = std::make_shared<const PlanTables>(pack_.data());
     for (uint32_t i = 0; i < page_sets; ++i) planners_.push_back(std::make_unique<Planner>(pack_.data(), tables));
 }
@@ -101,6 +101,23 @@ LightState& LightState::operator=(LightState&&) noexcept = default;
 
 void LightState::setElement(uint32_t element, Weight weight) {
     for (auto& planner : planners_) planner->setElement(element, normalised(weight));
+}
+
+Expected<void> LightState::checkHeld(uint32_t element, const Weight& weight) const {
+    if (!held_[element] || weight == Weight(0)) return {};
+    return fail(
+        ErrorCode::InvalidArgument,
+        fmt::format("Light set \"{}\": its records are not loaded, so its weight is held at 0; load them first.",
+                    pack_.elements()[element].name));
+}
+
+Expected<void> LightState::checkSet(LightSet set) const {
+    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element);
+}
+
+void LightState::hold(LightSet set, bool held) {
+    if (held) setElement(set.element, 0);
+    held_[set.element] = held;
 }
 
 Expected<LightSet> LightState::lightSet(std::string_view name) const {
@@ -118,6 +135,7 @@ Expected<Door> LightState::door(std::string_view name) const {
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::LightSet, set.element); !ok) return ok;
     if (auto ok = checkWeight(pack_.elements()[set.element], weight); !ok) return ok;
+    if (auto ok = checkHeld(set.element, weight); !ok) return ok;
     setElement(set.element, weight);
     return {};
 }
@@ -140,13 +158,15 @@ Expected<void> LightState::apply(std::string_view state) {
         for (uint32_t i = 0; i < elements.size(); ++i) {
             if (elements[i].kind != ElementKind::LightSet) continue;
             if (auto ok = checkWeight(elements[i], assignment.value); !ok) return ok;
-            changes.push_back({i, assignment.value});
+            if (!held_[i]) changes.push_back({i, assignment.value});
         }
     }
     for (const StateAssignment& assignment : *assignments) {
         if (assignment.target == StateAssignment::Target::AllSets) continue;
         if (auto ok = resolve(elements, assignment, changes); !ok) return ok;
     }
+    for (const ElementChange& change : changes)
+        if (auto ok = checkHeld(change.element, change.weight); !ok) return ok;
     for (const ElementChange& change : changes) setElement(change.element, change.weight);
     return {};
 }

@@ -54,12 +54,14 @@ class LightState {
     Expected<LightSet> lightSet(std::string_view name) const;
     Expected<Door> door(std::string_view name) const;
 
-    // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum.
+    // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum, and, unless
+    // it is 0, for a set whose records are not loaded (Runtime::dropRecords).
     Expected<void> setWeight(LightSet set, Weight weight);
     // `open`: 0 closed .. 1 open.
     Expected<void> setDoor(Door door, float open);
     // All at once, e.g. "hall=0.5,alarm=1/0.2/0.2,door:front=1"; "all=0" sets every light set first, wherever it is
-    // written. What is not named keeps its weight. On an error nothing has changed.
+    // written (sets whose records are not loaded stay at 0). What is not named keeps its weight. On an error nothing
+    // has changed.
     Expected<void> apply(std::string_view state);
     // Takes effect with the next update; 0 and 0 bring the exact state with it. The first call that sets a limit costs
     // a pass over the pack's records. Refused: a tolerance that is negative or not finite.
@@ -74,12 +76,17 @@ class LightState {
     explicit LightState(const Pack& pack, uint32_t page_sets = 1);
     Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }
     const Planner& planner(uint32_t page_set = 0) const { return *planners_[page_set]; }
+    // A held set is at 0 and refuses other weights: its records are not there. Released, it is still at 0.
+    void hold(LightSet set, bool held);
+    Expected<void> checkSet(LightSet set) const;
 
    private:
     void setElement(uint32_t element, Weight weight);
+    Expected<void> checkHeld(uint32_t element, const Weight& weight) const;
 
     Pack pack_;
     std::vector<std::unique_ptr<Planner>> planners_;
+    std::vector<bool> held_;  // per element
 };
 
 // What one update touched. Bytes are those that the kernels read and write, by count of records.

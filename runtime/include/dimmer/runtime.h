@@ -42,6 +42,12 @@ enum class Buffering {
 struct RuntimeOptions {
     UpdateMode mode = UpdateMode::WorkList;
     Buffering buffering = Buffering::InPlace;
+    // Device memory for records, in bytes; 0: room for all. Less needs load_records = false: then light sets are loaded
+    // and dropped as the game moves on.
+    uint64_t records_bytes_max = 0;
+    // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
+    // always-on light that doors let through is loaded in any case.
+    bool load_records = true;
     // Write GPU timestamps around each update, read by stats(). Off costs nothing.
     bool timestamps = true;
 };
@@ -54,6 +60,14 @@ struct LightmapImages {
     VkImageView direction_view = VK_NULL_HANDLE;
     VkSampler sampler = VK_NULL_HANDLE;  // bilinear, clamp to edge
     uint32_t width = 0, height = 0, layers = 0;
+};
+
+enum class RecordsState { Loaded, Loading, Dropped };
+
+// Of everything that was asked for since nothing was loading.
+struct LoadProgress {
+    uint64_t done_bytes = 0, total_bytes = 0;
+    bool finished() const { return done_bytes == total_bytes; }
 };
 
 // What an update of submit() waits for: a semaphore that says that the frames which sampled the pages are done.
@@ -95,6 +109,19 @@ class Runtime : public LightState {
     // it once the commands have completed.
     Expected<UpdateStats> wait();
 
+    // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
+    // the next update takes its light off the pages. What was record()ed before must have been submitted. Unsupported
+    // in modes gather and scatter.
+    Expected<void> dropRecords(LightSet set);
+    // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room.
+    // Loaded, the set is at 0 and takes any weight.
+    Expected<void> loadRecords(LightSet set);
+    RecordsState recordsState(LightSet set) const;
+    // Copies the next piece, of at most so many bytes (and 4 MiB), and returns at once; while the last piece is under
+    // way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while it
+    // loads.
+    Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
+
     // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns; the
     // other set is pageSet() ^ 1, for descriptors that are written once.
     LightmapImages images() const { return images(pageSet()); }
@@ -114,6 +141,8 @@ class Runtime : public LightState {
     struct Impl;
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl);
     bool planNext();
+    Expected<void> checkLoadable(LightSet set) const;
+    void finishLoading();
     void finish(double host_us);
     std::unique_ptr<Impl> impl_;
 };
