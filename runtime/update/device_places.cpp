@@ -26,9 +26,9 @@ DeviceBytes deviceBytesOf(const PackData& data) {
         receivers += paddedReceivers(cluster.receiver_count);
         records += uint64_t{paddedReceivers(cluster.receiver_count)} * cluster.term_count;
     }
-    const uint64_t tables[] = {receivers * sizeof(uint32_t),         receivers * sizeof(TexelRecord),
-                               records * sizeof(TexelRecord),        data.batches.size() * sizeof(BatchPlace),
-                               data.terms.size() * sizeof(WorkTerm)};
+    const uint64_t tables[] = {receivers * sizeof(uint32_t),           receivers * sizeof(TexelRecord),
+                               records * sizeof(TexelRecord),          data.batches.size() * sizeof(BatchPlace),
+                               data.batches.size() * sizeof(WorkItem), data.terms.size() * sizeof(WorkTerm)};
     for (const uint64_t table : tables) bytes.ancillary += std::max(table, texel_buffer_bytes_min);
     bytes.ancillary -= bytes.dynamic;  // of which the tables above are made too
     return bytes;
