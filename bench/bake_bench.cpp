@@ -120,7 +120,7 @@ void finalGather(benchmark::State& state) {
             std::vector<ReceiverLight> row;
             for (size_t i = begin; i < end; ++i) {
                 row.clear();
-                gather.gather(i, std::array{always_group}, l.outgoing, options, row);
+                gather.gather(gatherer.at(i), std::array{always_group}, l.outgoing, options, row);
                 benchmark::DoNotOptimize(row.data());
             }
         });

@@ -225,6 +225,7 @@ void LevelRenderer::recordMeshes(VkCommandBuffer commands, const CameraPose& cam
     constants.clip_from_world =
         clipFromWorld(camera, static_cast<float>(extent_.width) / static_cast<float>(extent_.height));
     constants.exposure = pack_.exposure();
+    constants.direction_model = static_cast<uint32_t>(pack_.directionModel());
     for (size_t i = 0; i < draws_.size(); ++i) {
         const Mesh& mesh = pack_.meshes()[i];
         constants.reflectance = toVec3(mesh.reflectance);

@@ -4,7 +4,7 @@ packages=(
     g++ cmake ninja-build ccache pkg-config python3
     libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
     libglm-dev libembree-dev libtbb-dev libzstd-dev libxxhash-dev
-    libtinygltf-dev nlohmann-json3-dev libstb-dev libcli11-dev libfmt-dev libspdlog-dev
+    libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev libspdlog-dev
 )
 test_packages=(libgtest-dev libgmock-dev clang-format)
 

@@ -12,6 +12,8 @@ layout(local_size_x_id = 1) in;
 // The most contributions that are on in an item of this dispatch, and up to 8 the number in each; -1: no limit.
 layout(constant_id = 0) const int terms_on = -1;
 
+layout(constant_id = 2) const uint color_format = 0u;  // ColorFormat
+
 layout(push_constant) uniform Dispatch {
     uint first_item;
     uint item_count;
@@ -68,14 +70,14 @@ uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
     for (int t = 0; t < terms_on; ++t) pair[t] = load_pair(term[t].x, offset);
 
     DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
-    dimmer_blend_add(sum, base_pair.x, base_pair.y, vec3(dimmer_weight_scale));
-    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].x, pair[t].y, uintBitsToFloat(term[t].yzw));
-    uvec2 first = dimmer_blend_encode(sum);
+    dimmer_blend_add(sum, base_pair.x, base_pair.y, vec3(dimmer_weight_scale(color_format)), color_format);
+    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].x, pair[t].y, uintBitsToFloat(term[t].yzw), color_format);
+    uvec2 first = dimmer_blend_encode(sum, color_format);
 
     sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
-    dimmer_blend_add(sum, base_pair.z, base_pair.w, vec3(dimmer_weight_scale));
-    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].z, pair[t].w, uintBitsToFloat(term[t].yzw));
-    return uvec4(first, dimmer_blend_encode(sum));
+    dimmer_blend_add(sum, base_pair.z, base_pair.w, vec3(dimmer_weight_scale(color_format)), color_format);
+    for (int t = 0; t < terms_on; ++t) dimmer_blend_add(sum, pair[t].z, pair[t].w, uintBitsToFloat(term[t].yzw), color_format);
+    return uvec4(first, dimmer_blend_encode(sum, color_format));
 }
 
 // The same for any number of terms, in blocks within which the sums stay in registers; padded like load_term.
@@ -83,8 +85,8 @@ uvec4 blend_pair_loop(Item item, uint offset) {
     uvec4 base_pair = texelFetch(base, int((item.place.x + offset) >> 1));
     DimmerTexelBlend first = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
     DimmerTexelBlend second = first;
-    dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale));
-    dimmer_blend_add(second, base_pair.z, base_pair.w, vec3(dimmer_weight_scale));
+    dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale(color_format)), color_format);
+    dimmer_blend_add(second, base_pair.z, base_pair.w, vec3(dimmer_weight_scale(color_format)), color_format);
     for (uint begin = 0u; begin < item.work.z; begin += uint(block)) {
         uvec4 pair[block];
         vec3 weight[block];
@@ -93,10 +95,10 @@ uvec4 blend_pair_loop(Item item, uint offset) {
             pair[t] = load_pair(term.x, offset);
             weight[t] = uintBitsToFloat(term.yzw);
         }
-        for (int t = 0; t < block; ++t) dimmer_blend_add(first, pair[t].x, pair[t].y, weight[t]);
-        for (int t = 0; t < block; ++t) dimmer_blend_add(second, pair[t].z, pair[t].w, weight[t]);
+        for (int t = 0; t < block; ++t) dimmer_blend_add(first, pair[t].x, pair[t].y, weight[t], color_format);
+        for (int t = 0; t < block; ++t) dimmer_blend_add(second, pair[t].z, pair[t].w, weight[t], color_format);
     }
-    return uvec4(dimmer_blend_encode(first), dimmer_blend_encode(second));
+    return uvec4(dimmer_blend_encode(first, color_format), dimmer_blend_encode(second, color_format));
 }
 
 ivec3 texel_of(uint address) {

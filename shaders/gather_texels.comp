@@ -7,6 +7,8 @@
 
 layout(local_size_x = 64) in;
 
+layout(constant_id = 0) const uint color_format = 0u;  // ColorFormat
+
 layout(push_constant) uniform Dispatch {
     uint receivers;
 }
@@ -26,7 +28,7 @@ void main() {
     if (receiver >= dispatch.receivers) return;
     uvec2 record = texelFetch(base, int(receiver)).xy;
     DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
-    dimmer_blend_add(sum, record.x, record.y, vec3(dimmer_weight_scale));
+    dimmer_blend_add(sum, record.x, record.y, vec3(dimmer_weight_scale(color_format)), color_format);
     bool any = false;
     uint end = texelFetch(first_record, int(receiver) + 1).x;
     for (uint i = texelFetch(first_record, int(receiver)).x; i < end; ++i) {
@@ -34,9 +36,9 @@ void main() {
         if (weight == vec3(0)) continue;
         any = true;
         uvec2 added = texelFetch(payload, int(i)).xy;
-        dimmer_blend_add(sum, added.x, added.y, weight);
+        dimmer_blend_add(sum, added.x, added.y, weight, color_format);
     }
-    if (any) record = dimmer_blend_encode(sum);
+    if (any) record = dimmer_blend_encode(sum, color_format);
     uint address = texelFetch(addresses, int(receiver)).x;
     ivec3 texel = ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);
     imageStore(irradiance_pages, texel, uvec4(record.x));

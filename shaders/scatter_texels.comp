@@ -11,6 +11,8 @@ layout(local_size_x = 64) in;
 // 0: sums start with the base; 1: one contribution is added; 2: pages are written.
 layout(constant_id = 0) const int pass = 0;
 
+layout(constant_id = 1) const uint color_format = 0u;  // ColorFormat
+
 layout(push_constant) uniform Dispatch {
     uint count;         // receivers, or records of the contribution
     uint first_record;  // of the contribution
@@ -46,17 +48,17 @@ void main() {
     if (pass == 0) {
         uvec2 record = texelFetch(base, int(index)).xy;
         DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
-        dimmer_blend_add(sum, record.x, record.y, vec3(dimmer_weight_scale));
+        dimmer_blend_add(sum, record.x, record.y, vec3(dimmer_weight_scale(color_format)), color_format);
         save(index, sum, 0.0);
     } else if (pass == 1) {
         uint record_index = dispatch.first_record + index;
         uint receiver = texelFetch(receivers, int(record_index)).x;
         uvec2 record = texelFetch(payload, int(record_index)).xy;
         DimmerTexelBlend sum = load(receiver);
-        dimmer_blend_add(sum, record.x, record.y, vec3(dispatch.weight_r, dispatch.weight_g, dispatch.weight_b));
+        dimmer_blend_add(sum, record.x, record.y, vec3(dispatch.weight_r, dispatch.weight_g, dispatch.weight_b), color_format);
         save(receiver, sum, 1.0);
     } else {
-        uvec2 record = sums[index].terms > 0.0 ? dimmer_blend_encode(load(index)) : texelFetch(base, int(index)).xy;
+        uvec2 record = sums[index].terms > 0.0 ? dimmer_blend_encode(load(index), color_format) : texelFetch(base, int(index)).xy;
         uint address = texelFetch(addresses, int(index)).x;
         ivec3 texel = ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);
         imageStore(irradiance_pages, texel, uvec4(record.x));

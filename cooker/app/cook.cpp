@@ -98,13 +98,17 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
+    c->add_flag_callback(
+        "--all-lights", [a] { a->options.light_grid = false; },
+        "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"
-        "budget: exit code 3, nothing is written. Distances in levels are in metres, densities in texels per metre.\n"
+        "budget: exit code 3, nothing is written; Ctrl-C: 130, the old pack stays.\n"
+        "Distances in levels are in metres, densities in texels per metre.\n"
         "Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }

@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/interrupt.h>
 #include <update/state_text.h>
 
 #include <fmt/format.h>
@@ -45,7 +46,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.footer(
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 3 over budget, "
-        "4 error above --max-error.\n"
+        "4 error above --max-error, 130 interrupted.\n"
         "`dimmer COMMAND --help` explains a command and gives an example.");
     int exit_code = exit_done;
     addCookCommand(app, exit_code);
@@ -57,6 +58,7 @@ int main(int argc, char** argv) {
     addReferenceCommand(app, exit_code);
     if (!isCommand(app, argc, argv)) return exit_bad_input;
     try {
+        endCleanlyOnInterrupt();
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         return app.exit(error) == 0 ? exit_done : exit_bad_input;

@@ -20,6 +20,8 @@ struct BakeSettings {
     float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
     float threshold = 0.01f;  // activity, as a share of a set's mean indirect irradiance where it lights directly
     uint32_t seed = 1;
+    // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
+    bool light_grid = true;
     // The final gather once per light group, as bakers do that know nothing of sharing rays: the same result, for
     // measuring against.
     bool per_set_passes = false;

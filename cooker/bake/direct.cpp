@@ -15,17 +15,16 @@ constexpr float sun_distance_m = 1e30f;
 
 }  // namespace
 
-uint64_t directLight(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, size_t receiver,
-                     GroupAccumulator<Gathered>& reflected, GroupAccumulator<Gathered>& stored) {
-    const Scene& scene = rays.scene();
+uint64_t directLight(const RayScene& rays, const LightGrid& grid, const Unwrap& unwrap, const Texels& texels,
+                     size_t receiver, GroupAccumulator<Gathered>& reflected, GroupAccumulator<Gathered>& stored) {
+    const auto seed = static_cast<uint32_t>(receiver);
     const uint32_t points = texels.sampleCount(receiver);
+    const glm::vec3 place = texels.sample(receiver, 0).position_m;
     uint64_t traced = 0;
-    for (uint32_t l = 0; l < scene.lights.size(); ++l) {
-        const PunctualLight& light = scene.lights[l];
-        if (light.bake == BakeMode::None) continue;
-        const uint32_t first = hash(l, static_cast<uint32_t>(receiver)) % points;
-        const bool near = light.type == LightType::Directional ||
-                          glm::distance(light.position_m, texels.sample(receiver, 0).position_m) < near_m;
+    grid.forEach(place, [&](uint32_t l) {
+        const PunctualLight& light = rays.scene().lights[l];
+        const uint32_t first = hash(grid.identity(l), seed) % points;
+        const bool near = light.type == LightType::Directional || glm::distance(light.position_m, place) < near_m;
         const uint32_t used = near ? points : 1;
         for (uint32_t i = 0; i < used; ++i) {
             const SamplePoint& p = texels.sample(receiver, (first + i) % points);
@@ -44,7 +43,7 @@ uint64_t directLight(const RayScene& rays, const Unwrap& unwrap, const Texels& t
             reflected[group].add(lux, direction);
             if (light.bake == BakeMode::Full) stored[group].add(lux, direction);
         }
-    }
+    });
     return traced;
 }
 

@@ -20,6 +20,12 @@ constexpr float coverage_min = 1e-5f;
 
 }  // namespace
 
+std::vector<uint32_t> meshGroups(const Scene& scene) {
+    std::vector<uint32_t> groups;
+    for (const SceneMesh& mesh : scene.meshes) groups.push_back(groupOf(mesh.light_set));
+    return groups;
+}
+
 EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups) {
     const Scene& scene = rays.scene();
     emitter_of_.assign(rays.triangles().size(), UINT32_MAX);

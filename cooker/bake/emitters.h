@@ -20,6 +20,9 @@ struct Emitter {
     bool double_sided = false;
 };
 
+// The light group of each of the scene's meshes, for EmitterSampler.
+std::vector<uint32_t> meshGroups(const Scene& scene);
+
 // A point on an emitter, seen from a receiver.
 struct EmitterSample {
     glm::vec3 direction;  // unit

@@ -11,8 +11,24 @@ namespace {
 // Fewer rounds say too little about their spread to stop on it.
 constexpr uint32_t rounds_min = 4;
 constexpr float normal_95 = 1.96f;
+// Light below this share of its group's mean need not be exact to a share of itself: the error metric's own floor.
+constexpr float noise_floor = 0.01f;
 
 }  // namespace
+
+std::vector<float> noiseFloors(const Series& series) {
+    std::vector<float> floors;
+    for (const GroupReport& g : series.groups) floors.push_back(noise_floor * g.mean_indirect_lux);
+    return floors;
+}
+
+FinalGatherOptions finalGatherOptions(const BakeSettings& settings, std::span<const float> floors_lux) {
+    return {.rays_max = settings.final_rays,
+            .emitter_samples = settings.emitter_samples,
+            .noise_max = settings.noise_max,
+            .seed = settings.seed + 1,
+            .floor_lux = floors_lux};
+}
 
 void FinalGather::State::add(const Gathered& round) {
     sum += round;
@@ -26,14 +42,14 @@ float FinalGather::State::varianceOfMean() const {
     return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
 }
 
-uint64_t FinalGather::gather(size_t receiver, std::span<const uint32_t> groups, const SparseLight& outgoing,
+uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> groups, const SparseLight& outgoing,
                              const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
     for (uint32_t g : groups) state_[g] = {};
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
     size_t waiting = groups.size();
     uint64_t traced = 0;
     for (uint32_t r = 0; r < rounds_max && waiting > 0; ++r) {
-        gatherer_.gather(receiver,
+        gatherer_.gather(from,
                          {.rays = rays_per_round,
                           .emitter_samples = options.emitter_samples,
                           .seed = options.seed,

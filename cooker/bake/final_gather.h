@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bake/bake.h>
+#include <bake/series.h>
 
 #include <span>
 
@@ -15,6 +16,10 @@ struct FinalGatherOptions {
     std::span<const float> floor_lux;  // per group: light below this need not be exact to a share of itself
 };
 
+// Per group, the light that need not be exact to a share of itself.
+std::vector<float> noiseFloors(const Series& series);
+FinalGatherOptions finalGatherOptions(const BakeSettings& settings, std::span<const float> floors_lux);
+
 // Rays come in rounds of this many; the spread of the rounds' means is the noise.
 inline constexpr uint32_t rays_per_round = 32;
 
@@ -23,9 +28,9 @@ class FinalGather {
    public:
     FinalGather(const Gatherer& gatherer, uint32_t groups) : gatherer_(gatherer), round_(groups), state_(groups) {}
 
-    // Appends to `out` the light of `groups` (ascending) at `receiver`. Rays are shared, decisions are not: a group's
+    // Appends to `out` the light of `groups` (ascending) at `from`. Rays are shared, decisions are not: a group's
     // value and sample count do not depend on which other groups are asked for. Returns the rays traced.
-    uint64_t gather(size_t receiver, std::span<const uint32_t> groups, const SparseLight& outgoing,
+    uint64_t gather(const GatherFrom& from, std::span<const uint32_t> groups, const SparseLight& outgoing,
                     const FinalGatherOptions& options, std::vector<ReceiverLight>& out);
 
    private:

@@ -3,56 +3,79 @@
 #pragma once
 
 #include <bake/emitters.h>
+#include <bake/sky.h>
 #include <bake/sparse_light.h>
 #include <charts/texels.h>
 
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 
 namespace dimmer::cook {
+
+// The tilt of Gathered's four normals: cosine and sine. The mean cosine of all normals within 60 degrees.
+inline constexpr float tilt_cos = 0.75f, tilt_sin = 0.66143783f;
 
 // Light of one group at one receiver.
 struct Gathered {
     glm::vec3 irradiance_lux{0};
-    // Integral of luminance * cos(theta) * direction, in the tangent frame: its length over the luminance of the
-    // irradiance says how directional the light is. Adds up over contributions.
-    glm::vec3 moment_lux{0};
+    // Luminance of the irradiance on normals tilted towards +tangent, +bitangent, -tangent and -bitangent: how
+    // irradiance falls off. Light from below the surface is left out. Adds up over contributions.
+    glm::vec4 tilted_lux{0};
 
     void add(glm::vec3 lux, glm::vec3 direction_tangent);
     Gathered& operator+=(const Gathered& o) {
         irradiance_lux += o.irradiance_lux;
-        moment_lux += o.moment_lux;
+        tilted_lux += o.tilted_lux;
         return *this;
     }
-    Gathered operator*(float s) const { return {irradiance_lux * s, moment_lux * s}; }
+    Gathered operator*(float s) const { return {irradiance_lux * s, tilted_lux * s}; }
 };
 
 struct GatherOptions {
     uint32_t rays = 64;            // cosine-distributed, shared out among the texel's sample points
-    uint32_t emitter_samples = 4;  // towards each light group's emitters
+    uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
+};
+
+// Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
+struct GatherFrom {
+    std::span<const SamplePoint> points;
+    uint32_t id = 0;
 };
 
 // Thread-safe: gather() only reads.
 class Gatherer {
    public:
     Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters)
-        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters) {}
+        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), sky_(rays.scene()) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit. `hits`, when given, takes for every ray the receiver that it hit, or no_index.
-    // Unbiased: emitters are found by area and by hit, weighted by the balance heuristic (Veach 1995).
-    void gather(size_t receiver, const GatherOptions& options, const SparseLight* outgoing,
+    // Unbiased: emitters are found by area and by hit, an image sky by its own density and by miss, weighted by the
+    // balance heuristic (Veach 1995).
+    void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                 GroupAccumulator<Gathered>& sum, uint32_t* hits) const;
 
+    GatherFrom at(size_t receiver) const {
+        return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)}, static_cast<uint32_t>(receiver)};
+    }
+
+    const RayScene& rays() const { return rays_; }
+    const Unwrap& unwrap() const { return unwrap_; }
+    const Texels& texels() const { return texels_; }
+
    private:
-    void sampleEmitters(size_t receiver, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+    glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const;
+    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
+    void sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const;
 
     const RayScene& rays_;
     const Unwrap& unwrap_;
     const Texels& texels_;
     const EmitterSampler& emitters_;
+    SkySampler sky_;
 };
 
 }  // namespace dimmer::cook

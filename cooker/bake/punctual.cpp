@@ -1,5 +1,7 @@
 #include <bake/punctual.h>
 
+#include <scene/ies.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -34,6 +36,7 @@ Illumination illuminate(const PunctualLight& light, glm::vec3 point) {
     const float clamped = std::max(distance_m, distance_min_m);
     float factor = window(light, distance_m) / (clamped * clamped);
     if (light.type == LightType::Spot) factor *= cone(light, direction);
+    if (light.profile) factor *= light.profile->shareTowards(light.profile_from_world * -direction);
     return {direction, distance_m, light.intensity * factor};
 }
 

@@ -14,7 +14,7 @@ struct Illumination {
 };
 
 // What `light` does at `point`. Inverse square with a least distance of 1 cm, windowed by the range; spots by the glTF
-// cone formula (KHR_lights_punctual).
+// cone formula (KHR_lights_punctual); measured luminaires by their profile (EXT_lights_ies).
 Illumination illuminate(const PunctualLight& light, glm::vec3 point);
 
 }  // namespace dimmer::cook

@@ -2,6 +2,7 @@
 
 #include <bake/punctual.h>
 #include <bake/sampling.h>
+#include <bake/sky.h>
 
 #include <algorithm>
 #include <bit>
@@ -92,6 +93,11 @@ struct ReferenceTracer::Path {
 struct ReferenceTracer::Vertex {
     glm::vec3 point{0}, normal{0};
     glm::vec3 reflectance{0};
+    glm::vec3 horizon{0};  // what lies below is dark; see ReferencePoint
+    // Of a direction to the normal; 0 below either.
+    float cosine(glm::vec3 direction) const {
+        return glm::dot(direction, horizon) < 0 ? 0 : std::max(0.0f, glm::dot(direction, normal));
+    }
     float lamp_weight_sum = 0;  // of the lamps, as seen from here
     float area_weight_sum = 0;  // of the emitters, as seen from here
 };
@@ -150,7 +156,7 @@ glm::vec3 ReferenceTracer::weightOf(std::optional<uint32_t> set) const {
 
 glm::vec3 ReferenceTracer::fromLight(const Light& light, const Vertex& vertex) const {
     const Illumination lit = illuminate(rays_.scene().lights[light.index], vertex.point);
-    const float cos_surface = glm::dot(vertex.normal, lit.towards_light);
+    const float cos_surface = vertex.cosine(lit.towards_light);
     if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0)) return glm::vec3(0);
     const float distance = std::isinf(lit.distance_m) ? far_m : lit.distance_m;
     return light.weight * lit.irradiance_lux *
@@ -218,7 +224,7 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     const float distance2 = glm::dot(to_lit, to_lit), distance = std::sqrt(distance2);
     if (!(distance > 0)) return glm::vec3(0);
     const glm::vec3 direction = to_lit / distance;
-    const float cos_here = glm::dot(vertex.normal, direction), cos_there = -glm::dot(lit->normal, direction);
+    const float cos_here = vertex.cosine(direction), cos_there = -glm::dot(lit->normal, direction);
     const Illumination there = illuminate(light, lit->point);
     const float cos_lamp = glm::dot(lit->normal, there.towards_light);
     if (!(cos_here > 0) || !(cos_there > 0) || !(cos_lamp > 0)) return glm::vec3(0);
@@ -252,7 +258,7 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     const Material& material = rays_.scene().materials[triangle.material];
     const float facing = -glm::dot(direction, triangle.normal);
     const float cos_emitter = material.double_sided ? std::abs(facing) : facing;
-    const float cos_surface = glm::dot(direction, vertex.normal);
+    const float cos_surface = vertex.cosine(direction);
     if (!(cos_emitter > 0) || !(cos_surface > 0)) return glm::vec3(0);
     const float by_area = areaPdf(vertex, chosen, distance, cos_emitter), by_hit = cos_surface / pi;
     // What is cut out or blended shines by its alpha, as a ray that hits it finds.
@@ -294,8 +300,9 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         orthonormalBasis(vertex.normal, t, b);
         const glm::vec3 d = cosineDirection(path.next2());
         const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
+        if (!(vertex.cosine(direction) > 0)) return sum;
         const auto hit = rays_.nearest(vertex.point, direction, far_m, path.nextBits());
-        if (!hit) return sum + throughput * scene.sky_radiance_cd_m2 * options_.always_weight;
+        if (!hit) return sum + throughput * skyRadiance(scene, direction) * options_.always_weight;
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
         if (hit->back && !scene.materials[triangle.material].double_sided) return sum;
         const float by_hit = d.z / pi, cos_there = std::abs(glm::dot(direction, triangle.normal));
@@ -320,8 +327,10 @@ ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t
 
 void ReferenceTracer::refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const {
     Vertex start;
-    start.point = point.position_m + point.normal * start_offset_m;
+    const bool on_surface = point.surface != glm::vec3(0);
+    start.point = point.position_m + (on_surface ? point.surface : point.normal) * start_offset_m;
     start.normal = point.normal;
+    start.horizon = point.surface;
     const glm::vec3 direct = directPart(start);
     // By place: the errors of two points are independent. Not by state: differences between states have less noise.
     const uint32_t seed = hashOf(point.normal, hashOf(point.position_m, options_.seed));

@@ -29,10 +29,12 @@ struct ReferenceValue {
     float luminance_error_lux = 0;
 };
 
-// Where irradiance is asked for: everything that the normal's hemisphere sees counts, so a normal that is tilted
-// against its surface sees some of that surface.
+// Where irradiance is asked for. On a surface with a normal of its own (of a normal map, say), what lies below that
+// surface is dark, as it is for what a pack stores: `surface` is the surface's normal. In the open it is zero, and
+// everything that the normal's hemisphere sees counts.
 struct ReferencePoint {
     glm::vec3 position_m, normal;
+    glm::vec3 surface{0};
 };
 
 // Running mean and variance over paths (Welford 1962) of red, green, blue and luminance.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,10 @@ namespace dimmer::cook {
 
 // Light group 0 is all always-on light; group 1 + s is light set s.
 inline constexpr uint32_t always_group = 0;
+// The group of what belongs to an optional light set.
+inline uint32_t groupOf(std::optional<uint32_t> light_set) {
+    return light_set ? 1 + *light_set : always_group;
+}
 
 struct GroupLight {
     uint32_t group = 0;

@@ -44,10 +44,23 @@ std::vector<Covered> coverConservatively(const Unwrap& unwrap) {
     return all;
 }
 
+// Halton points of the unit square, shifted so that the first `count`, which a whole texel takes, have their centre of
+// gravity in the middle: light that changes evenly across a texel is then right at its centre, where it is looked up.
+std::vector<glm::vec2> centredHalton(uint32_t count) {
+    std::vector<glm::vec2> points;
+    glm::vec2 sum(0);
+    for (uint32_t i = 0; i < std::max(halton_tries, count); ++i) {
+        points.emplace_back(radicalInverse(2, i), radicalInverse(3, i));
+        if (i < count) sum += points.back();
+    }
+    for (glm::vec2& p : points) p = glm::fract(p + 0.5f - sum / static_cast<float>(count));
+    return points;
+}
+
 class TexelSampler {
    public:
     TexelSampler(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max)
-        : rays_(rays), unwrap_(unwrap), samples_max_(samples_max) {}
+        : rays_(rays), unwrap_(unwrap), samples_max_(samples_max), tries_(centredHalton(samples_max)) {}
 
     struct Result {
         std::vector<SamplePoint> points;
@@ -61,10 +74,10 @@ class TexelSampler {
         const auto x = static_cast<uint32_t>(texel % unwrap_.page_width);
         const auto y = static_cast<uint32_t>(texel / unwrap_.page_width % unwrap_.page_height);
         Usable usable;
-        for (uint32_t i = 1; i <= halton_tries && result.points.size() < samples_max_; ++i) {
+        for (const glm::vec2 within : tries_) {
+            if (result.points.size() >= samples_max_) break;
             if (result.points.empty() && usable.dropped >= drops_max) break;
-            const glm::vec2 p(static_cast<float>(x) + radicalInverse(2, i),
-                              static_cast<float>(y) + radicalInverse(3, i));
+            const glm::vec2 p = glm::vec2(x, y) + within;
             for (const Covered& c : faces)
                 if (auto b = barycentric(unwrap_.uv_texels[c.face], p)) {
                     tryPoint({c.face, *b}, usable, result);
@@ -158,6 +171,7 @@ class TexelSampler {
     const RayScene& rays_;
     const Unwrap& unwrap_;
     uint32_t samples_max_;
+    std::vector<glm::vec2> tries_;
 };
 
 }  // namespace

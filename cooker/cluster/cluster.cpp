@@ -55,15 +55,15 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
 
 void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
     const std::vector<Target> targets = listTargets(texels);
-    pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width,
-                           encodeTexel({}, pack.exposure));
+    const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
+    pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
     std::map<std::vector<uint32_t>, std::vector<uint32_t>> members;  // contributions -> targets
     std::vector<uint32_t> signature;
     for (uint32_t t = 0; t < targets.size(); ++t) {
         signature.clear();
         for (const ReceiverLight& l : baked.light.row(targets[t].source)) {
             if (l.group == always_group)
-                pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, pack.exposure);
+                pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
             else
                 signature.push_back(l.group - 1);
         }
@@ -80,7 +80,7 @@ void buildClusters(const Texels& texels, const Baked& baked, PackData& pack) {
         for (uint32_t t : cluster->second) {
             pack.addresses.push_back(targets[t].address);
             for (const ReceiverLight& l : baked.light.row(targets[t].source))
-                if (l.group != always_group) payloads[l.group - 1].push_back(encodeTexel(l.light, pack.exposure));
+                if (l.group != always_group) payloads[l.group - 1].push_back(encodeTexel(l.light, encoding));
         }
         appendCluster(cluster->first, static_cast<uint32_t>(cluster->second.size()), pack);
     }

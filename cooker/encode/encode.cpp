@@ -1,44 +1,98 @@
 #include <encode/encode.h>
 
 #include <bake/sampling.h>
-#include <format/texel.h>
 
 #include <algorithm>
 #include <cmath>
 
 namespace dimmer::cook {
+namespace {
 
-HighlightFit fitHighlight(const Gathered& light) {
-    const float lux = luminance(light.irradiance_lux);
-    if (!(lux > 0)) return {};
-    const glm::vec3 c = light.moment_lux / lux;
-    // |c - r (0,0,2/3)| = 1 - r  <=>  5/9 r^2 - (2 - 4/3 c_z) r + 1 - |c|^2 = 0; the smaller root is the share.
-    const float half_b = 1 - 2.0f / 3.0f * c.z;
-    const float discriminant = std::max(0.0f, half_b * half_b - 5.0f / 9.0f * (1 - glm::dot(c, c)));
-    const float ambient = std::clamp((half_b - std::sqrt(discriminant)) * 9.0f / 5.0f, 0.0f, 1.0f);
-    glm::vec3 d = c - glm::vec3(0, 0, ambient * 2.0f / 3.0f);
-    const float length = glm::length(d);
-    if (!(length > 1e-6f)) return {};
-    d /= length;
-    if (d.z < highlight_z_min) {
-        const float across = std::sqrt(d.x * d.x + d.y * d.y);
-        const float scale = std::sqrt(1 - highlight_z_min * highlight_z_min) / std::max(across, 1e-6f);
-        d = {d.x * scale, d.y * scale, highlight_z_min};
-    }
-    return {ambient, d};
+constexpr int rounds_max = 8;
+constexpr float moment_max = 9.9f;  // of the format's 9.98
+// Keeps the normal equations solvable where the model is clamped on most of the normals.
+constexpr float damping = 1e-4f;
+
+using Parameters = glm::vec3;  // r, b_x, b_y
+
+const std::array<glm::vec3, 4> tilted_normals = {
+    {{tilt_sin, 0, tilt_cos}, {0, tilt_sin, tilt_cos}, {-tilt_sin, 0, tilt_cos}, {0, -tilt_sin, tilt_cos}}};
+
+struct Falloff {
+    float value;
+    Parameters slope;  // by r, b_x, b_y
+};
+
+// E(n) / E_z; see runtime/format/texel.h.
+Falloff falloff(const Parameters& p, glm::vec3 n, DirectionModel model) {
+    const float highlight = p.y * n.x + p.z * n.y + (1 - p.x) * n.z;
+    const Parameters slope(1 - n.z, n.x, n.y);
+    if (model == DirectionModel::Linear)
+        return p.x + highlight > 0 ? Falloff{p.x + highlight, slope} : Falloff{0, Parameters(0)};
+    return highlight > 0 ? Falloff{p.x + highlight, slope} : Falloff{p.x, {1, 0, 0}};
 }
 
-TexelRecord encodeTexel(const Gathered& light, float exposure) {
-    const glm::vec3 stored = light.irradiance_lux * exposure;
-    const HighlightFit fit = fitHighlight(light);
-    const float share = 1 - fit.ambient;
-    return {encodeR11G11B10(stored.x, stored.y, stored.z),
-            encodeDirection(1, fit.ambient, share * fit.direction.x / fit.direction.z,
-                            share * fit.direction.y / fit.direction.z)};
+Parameters clamped(Parameters p) {
+    return {std::clamp(p.x, 0.0f, 1.0f), std::clamp(p.y, -moment_max, moment_max),
+            std::clamp(p.z, -moment_max, moment_max)};
+}
+
+float residual(const Parameters& p, glm::vec4 target, DirectionModel model) {
+    float sum = 0;
+    for (int i = 0; i < 4; ++i) {
+        const float error = falloff(p, tilted_normals[static_cast<size_t>(i)], model).value - target[i];
+        sum += error * error;
+    }
+    return sum;
+}
+
+// Gauss-Newton, as long as it helps.
+Parameters refine(Parameters p, glm::vec4 target, DirectionModel model, float& best) {
+    best = residual(p, target, model);
+    for (int round = 0; round < rounds_max; ++round) {
+        glm::mat3 normal(damping);
+        glm::vec3 gradient(0);
+        for (int i = 0; i < 4; ++i) {
+            const Falloff f = falloff(p, tilted_normals[static_cast<size_t>(i)], model);
+            normal += glm::outerProduct(f.slope, f.slope);
+            gradient += f.slope * (target[i] - f.value);
+        }
+        const Parameters next = clamped(p + glm::inverse(normal) * gradient);
+        const float now = residual(next, target, model);
+        if (!(now < best * 0.999f)) break;
+        p = next;
+        best = now;
+    }
+    return p;
+}
+
+}  // namespace
+
+Highlight fitHighlight(const Gathered& light, DirectionModel model) {
+    const float lux = luminance(light.irradiance_lux);
+    if (!(lux > 0)) return {};
+    const glm::vec4 target = light.tilted_lux / lux;
+    const glm::vec2 across(target.x - target.z, target.y - target.w);
+    const float mean = (target.x + target.y + target.z + target.w) / 4;
+    // From where nothing is clamped, and from a lone lamp near the surface: the clamp parts the two.
+    const Parameters open = clamped({(mean - tilt_cos) / (1 - tilt_cos), across / (2 * tilt_sin)});
+    const Parameters lamp = clamped({0.05f, glm::max(glm::vec2(target.x, target.y) - tilt_cos, 0.0f) / tilt_sin -
+                                                glm::max(glm::vec2(target.z, target.w) - tilt_cos, 0.0f) / tilt_sin});
+    float open_residual, lamp_residual;
+    const Parameters a = refine(open, target, model, open_residual), b = refine(lamp, target, model, lamp_residual);
+    const Parameters& best = lamp_residual < open_residual ? b : a;
+    return {best.x, best.y, best.z};
+}
+
+TexelRecord encodeTexel(const Gathered& light, const TexelEncoding& encoding) {
+    const glm::vec3 stored = light.irradiance_lux * encoding.exposure;
+    const Highlight fit = fitHighlight(light, encoding.direction_model);
+    return {encodeColor(encoding.color_format, stored.x, stored.y, stored.z),
+            encodeDirection(1, fit.ambient, fit.bx, fit.by)};
 }
 
 float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
-    constexpr float half_of_largest = 64512.0f / 2;  // of the 10-bit channel, the smaller
+    constexpr float half_of_largest = 64512.0f / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
     float largest = 0;
     for (size_t i = 0; i < baked.light.rows(); ++i) {
         glm::vec3 sum(0);

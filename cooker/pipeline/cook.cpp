@@ -39,18 +39,6 @@ uint64_t peakBytes() {
     return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
-    return {.series_rays = quality.series_rays,
-            .final_rays = quality.rays,
-            .emitter_samples = quality.emitter_samples,
-            .noise_max = quality.noise,
-            .denoise = quality.denoise != 0,
-            .bounces_max = quality.bounces,
-            .tail_max = quality.tolerance,
-            .threshold = profile.threshold,
-            .per_set_passes = quality.per_set_passes};
-}
-
 // Elements and contributions: one contribution per light set, until doors have their own.
 void describeElements(const Scene& scene, const Baked& baked, PackData& pack, CookStats& stats) {
     for (const SceneLightSet& set : scene.light_sets)
@@ -78,6 +66,19 @@ void describePlaces(const Scene& scene, PackData& pack) {
 }
 
 }  // namespace
+
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
+    return {.series_rays = quality.series_rays,
+            .final_rays = quality.rays,
+            .emitter_samples = quality.emitter_samples,
+            .noise_max = quality.noise,
+            .denoise = quality.denoise != 0,
+            .bounces_max = quality.bounces,
+            .tail_max = quality.tolerance,
+            .threshold = profile.threshold,
+            .light_grid = quality.light_grid,
+            .per_set_passes = quality.per_set_passes};
+}
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
                              CookStats& stats) {
@@ -123,6 +124,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         describeElements(scene, baked, pack, stats);
         std::vector<float> max_weights = {1};
         for (const SceneLightSet& set : scene.light_sets) max_weights.push_back(set.max_weight);
+        pack.color_format = profile.color_format;
+        pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, pack);
         pack.meshes = levelMeshes(*rays, charts);
@@ -139,8 +142,10 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
     auto profile = loadProfile(options.profile);
     if (!profile) return std::unexpected(profile.error());
-    for (Quality* quality : {&profile->draft, &profile->preview, &profile->final})
+    for (Quality* quality : {&profile->draft, &profile->preview, &profile->final}) {
         quality->per_set_passes = options.per_set_passes;
+        quality->light_grid = options.light_grid;
+    }
     CookResult result;
     Expected<Scene> scene;
     {

@@ -1,7 +1,7 @@
 // The whole cook: level in, pack out. main() and the tests call the same functions.
 #pragma once
 
-#include <bake/progress.h>
+#include <bake/bake.h>
 #include <pack/pack_data.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
@@ -20,6 +20,7 @@ struct CookOptions {
     std::string quality = "preview";
     uint32_t threads = 0;         // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
+    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
 };
 
 struct CookStats {
@@ -33,6 +34,8 @@ struct CookStats {
 // Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats);
+
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality);
 
 struct CookResult {
     PackData pack;

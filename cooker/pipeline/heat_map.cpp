@@ -60,7 +60,7 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
     for (uint32_t page = 0; page < pack.pageCount(); ++page) {
         Picture picture{static_cast<int>(pack.pageWidth()), static_cast<int>(pack.pageHeight()), {}};
         for (uint32_t texel : runtime.irradiancePages().subspan(page * texels, texels)) {
-            const auto [r, g, b] = decodeR11G11B10(texel);
+            const auto [r, g, b] = decodeColor(pack.colorFormat(), texel);
             picture.rgb.insert(picture.rgb.end(), 3, grey(static_cast<double>(luminance(r, g, b) / pack.exposure())));
         }
         const int radius = std::max(1, picture.width / 256);

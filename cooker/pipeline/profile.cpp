@@ -24,9 +24,19 @@ constexpr const char* base_profile = "desktop";
 
 struct Setting {
     std::string key;
-    std::variant<uint64_t*, uint32_t*, float*> target;
-    double least, most;
+    std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*> target;
+    double least = 0, most = 0;  // of a number
 };
+
+// The names of a choice's values, by value.
+constexpr std::array color_formats = {"r11g11b10f", "e5b9g9r9"};
+constexpr std::array direction_models = {"ahd", "linear"};
+constexpr const auto& namesOf(ColorFormat) {
+    return color_formats;
+}
+constexpr const auto& namesOf(DirectionModel) {
+    return direction_models;
+}
 
 std::vector<Setting> settingsOf(Profile& p) {
     constexpr double any_bytes = 1e15;
@@ -37,6 +47,8 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"budgets.per_element", &p.budget_per_element, 0, any_bytes},
         {"lightmaps.texels_per_metre", &p.texels_per_metre, 0.01, 256},
         {"lightmaps.page_size", &p.page_size, 64, 4096},
+        {"lightmaps.color", &p.color_format},
+        {"lightmaps.model", &p.direction_model},
         {"records.threshold", &p.threshold, 0, 1},
     };
     for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}}) {
@@ -68,7 +80,17 @@ void flatten(const json& object, const std::string& prefix, std::map<std::string
     }
 }
 
-Expected<void> assign(const Setting& setting, const json& value, const std::string& source) {
+template <class Choice>
+Expected<void> choose(const Setting& setting, Choice& target, const json& value, const std::string& source) {
+    const auto& names = namesOf(Choice{});
+    const auto name = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
+    if (name == names.end())
+        return bad(source, fmt::format("'{}' must be one of \"{}\"", setting.key, fmt::join(names, "\", \"")));
+    target = static_cast<Choice>(name - names.begin());
+    return {};
+}
+
+Expected<void> assignNumber(const Setting& setting, const json& value, const std::string& source) {
     if (!value.is_number()) return bad(source, fmt::format("'{}' must be a number", setting.key));
     const double number = value.get<double>();
     if (!(number >= setting.least && number <= setting.most))
@@ -77,9 +99,21 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
     const bool whole = !std::holds_alternative<float*>(setting.target);
     if (whole && number != std::floor(number))
         return bad(source, fmt::format("'{}' is {}, it must be a whole number", setting.key, number));
-    std::visit([&](auto* target) { *target = static_cast<std::remove_pointer_t<decltype(target)>>(number); },
-               setting.target);
+    std::visit(
+        [&](auto* target) {
+            if constexpr (std::is_arithmetic_v<std::remove_pointer_t<decltype(target)>>)
+                *target = static_cast<std::remove_pointer_t<decltype(target)>>(number);
+        },
+        setting.target);
     return {};
+}
+
+Expected<void> assign(const Setting& setting, const json& value, const std::string& source) {
+    if (const auto* format = std::get_if<ColorFormat*>(&setting.target))
+        return choose(setting, **format, value, source);
+    if (const auto* model = std::get_if<DirectionModel*>(&setting.target))
+        return choose(setting, **model, value, source);
+    return assignNumber(setting, value, source);
 }
 
 // "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
@@ -179,6 +213,14 @@ double shortDecimal(float value) {
 
 }  // namespace
 
+const char* nameOf(ColorFormat format) {
+    return color_formats[static_cast<size_t>(format)];
+}
+
+const char* nameOf(DirectionModel model) {
+    return direction_models[static_cast<size_t>(model)];
+}
+
 const Quality* Profile::quality(const std::string& name) const {
     if (name == "draft") return &draft;
     if (name == "preview") return &preview;
@@ -198,6 +240,8 @@ std::string Profile::settingsJson(const std::string& quality) const {
                 auto& setting = out[s.key];
                 if constexpr (std::is_same_v<decltype(v), float*>)
                     setting["value"] = shortDecimal(*v);
+                else if constexpr (std::is_enum_v<std::remove_pointer_t<decltype(v)>>)
+                    setting["value"] = nameOf(*v);
                 else
                     setting["value"] = *v;
                 setting["from"] = from == origin.end() ? "default" : from->second;
@@ -205,6 +249,26 @@ std::string Profile::settingsJson(const std::string& quality) const {
             s.target);
     }
     return out.dump();
+}
+
+Expected<CookSettings> readSettings(const std::string& settings_json) {
+    const std::string source = "of the pack";
+    const auto root = parseObject({source, source, {}, settings_json});
+    if (!root) return std::unexpected(root.error());
+    CookSettings out;
+    const auto settings = settingsOf(out.profile);
+    for (const auto& [key, setting] : root->items()) {
+        if (!setting.is_object() || !setting.contains("value"))
+            return bad(source, fmt::format("'{}' has no value", key));
+        const json& value = setting["value"];
+        if (key == "quality" && value.is_string()) out.quality = value.get<std::string>();
+        const auto it = std::ranges::find(settings, key, &Setting::key);
+        if (it == settings.end()) continue;
+        if (auto ok = assign(*it, value, source); !ok) return std::unexpected(ok.error());
+    }
+    if (!out.profile.quality(out.quality))
+        return bad(source, "no quality is named; the pack was not cooked from a level");
+    return out;
 }
 
 Expected<Profile> loadProfile(const std::string& name_or_file) {

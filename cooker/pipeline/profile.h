@@ -1,7 +1,7 @@
 // A profile: the budgets, densities and qualities of a target platform.
 #pragma once
 
-#include <dimmer/error.h>
+#include <dimmer/pack.h>
 
 #include <cstdint>
 #include <map>
@@ -9,6 +9,10 @@
 #include <vector>
 
 namespace dimmer::cook {
+
+// As profiles name them: "e5b9g9r9", "ahd".
+const char* nameOf(ColorFormat format);
+const char* nameOf(DirectionModel model);
 
 struct Quality {
     uint32_t samples_per_texel = 4;  // points of a texel that rays start from
@@ -20,6 +24,7 @@ struct Quality {
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
     bool per_set_passes = false;     // see BakeSettings; from the command line alone
+    bool light_grid = true;          // likewise
 };
 
 struct Profile {
@@ -27,6 +32,8 @@ struct Profile {
     uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_per_element = 0;
     float texels_per_metre = 4;
     uint32_t page_size = 2048;
+    ColorFormat color_format = ColorFormat::E5B9G9R9;
+    DirectionModel direction_model = DirectionModel::Ahd;
     float threshold = 0.01f;  // activity, see BakeSettings
     Quality draft, preview, final;
 
@@ -37,6 +44,13 @@ struct Profile {
     // Every setting as JSON: {"lightmaps.texels_per_metre": {"value": 4, "from": "desktop"}, ...}.
     std::string settingsJson(const std::string& quality) const;
 };
+
+// What settingsJson() wrote: the profile as far as it was used, and the name of the quality.
+struct CookSettings {
+    Profile profile;
+    std::string quality;
+};
+Expected<CookSettings> readSettings(const std::string& settings_json);
 
 // A shipped profile by name, or a file. A profile changes what it names of the one that it `extends` (a shipped one, or
 // a file beside it; "desktop" where it does not say). Unknown keys, wrong types and values out of range are errors that

@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 #include <dimmer/cpu_runtime.h>
 #include <format/texel.h>
+#include <pipeline/dissect.h>
 
 #include <fmt/format.h>
 
@@ -103,7 +104,8 @@ glm::vec3 tiltedNormal(glm::vec2 u) {
 
 std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool tilted) {
     std::vector<ReferencePoint> out;
-    for (const VerifyPoint& p : points) out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal});
+    for (const VerifyPoint& p : points)
+        out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal, p.frame.normal});
     return out;
 }
 
@@ -144,11 +146,13 @@ bool reached(const ErrorFigures& f) {
 
 // What rounding to the nearest of the colour format's steps costs on average, by arithmetic: a quarter of a step.
 // Channels are rounded on their own; in luminance their errors partly cancel, which this does not count on.
-double formatError(std::span<const LightPair> pairs, double exposure, double floor_lux) {
+double formatError(std::span<const LightPair> pairs, const Pack& pack, double floor_lux) {
+    const double exposure = static_cast<double>(pack.exposure());
+    const int mantissa_bits = pack.colorFormat() == ColorFormat::R11G11B10F ? 6 : 8;
     double sum = 0;
     for (const LightPair& p : pairs) {
         const double stored = std::max(p.value_lux * exposure, 0x1p-14);
-        const double step = std::exp2(std::floor(std::log2(stored)) - 6);  // six bits of mantissa
+        const double step = std::exp2(std::floor(std::log2(stored)) - mantissa_bits);
         sum += 0.25 * step / exposure / (p.reference_lux + floor_lux);
     }
     return pairs.empty() ? 0 : sum / static_cast<double>(pairs.size());
@@ -200,6 +204,24 @@ Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
     return fail(ErrorCode::BadInput, fmt::format("{}: the pack has other light sets or doors than this level; cook the "
                                                  "level again.",
                                                  scene.file));
+}
+
+Expected<void> dissect(const Scene& scene, const Pack& pack, const VerifyOptions& options, const ReferenceState& state,
+                       Progress& progress, VerifyReport& report) {
+    if (options.causes) {
+        if (std::ranges::find(state.door_open, true) != state.door_open.end())
+            return fail(ErrorCode::InvalidArgument, "Causes of error are told apart with closed doors only.");
+        const auto causes =
+            errorCauses(scene, pack, report.points, report.surface_pairs, state, report.floor_lux, progress);
+        if (!causes) return std::unexpected(causes.error());
+        report.causes.insert(causes->begin(), causes->end());
+    }
+    if (options.formats) {
+        auto formats = formatErrors(scene, pack, report.points, progress);
+        if (!formats) return std::unexpected(formats.error());
+        report.formats = std::move(*formats);
+    }
+    return {};
 }
 
 Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress,
@@ -315,8 +337,9 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     report.converged = reached(report.surface) && reached(report.tilted);
     for (const Measured* m : {&at_surface, &at_tilted})
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
-    report.causes["colour_format"] = formatError(at_surface.pairs, static_cast<double>(pack.exposure()), *floor_lux);
+    report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);
     report.causes["directional_model"] = modelError(at_surface, at_tilted, *floor_lux);
+    if (auto ok = dissect(scene, pack, options, *state, progress, report); !ok) return std::unexpected(ok.error());
     if (options.sets)
         if (auto ok = verifySets(scene, pack, options, progress, report); !ok) return std::unexpected(ok.error());
     progress.finish();

@@ -7,9 +7,9 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr std::array<std::string_view, 5> known_extensions = {"KHR_lights_punctual", "KHR_materials_emissive_strength",
-                                                              "KHR_materials_specular", "KHR_mesh_quantization",
-                                                              "KHR_texture_transform"};
+constexpr std::array<std::string_view, 6> known_extensions = {
+    "EXT_lights_ies",         "KHR_lights_punctual",   "KHR_materials_emissive_strength",
+    "KHR_materials_specular", "KHR_mesh_quantization", "KHR_texture_transform"};
 constexpr const char* lights_extension = "KHR_lights_punctual";
 
 class Checker {

@@ -17,22 +17,6 @@ constexpr size_t nesting_max = 100;
 // The parser counts bytes in 32 bits, images in 31.
 constexpr uintmax_t file_bytes_max = std::numeric_limits<int32_t>::max();
 
-Expected<Bytes> readFile(const std::filesystem::path& path) {
-    std::error_code problem;
-    if (!std::filesystem::is_regular_file(path, problem))
-        return fail(ErrorCode::Io, fmt::format("{}: there is no such file. Check the path.", path.string()));
-    const uintmax_t size = std::filesystem::file_size(path, problem);
-    if (problem) return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
-    if (size > file_bytes_max)
-        return fail(ErrorCode::BadInput,
-                    fmt::format("{}: is larger than 2 GiB. Split the level into several files.", path.string()));
-    Bytes bytes(static_cast<size_t>(size));
-    std::ifstream stream(path, std::ios::binary);
-    stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    if (!stream) return fail(ErrorCode::Io, fmt::format("{}: cannot be read. Check its permissions.", path.string()));
-    return bytes;
-}
-
 uint32_t littleEndian32(std::span<const unsigned char> bytes, size_t offset) {
     return uint32_t{bytes[offset]} | uint32_t{bytes[offset + 1]} << 8 | uint32_t{bytes[offset + 2]} << 16 |
            uint32_t{bytes[offset + 3]} << 24;
@@ -146,6 +130,22 @@ Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, const std::string&
 }
 
 }  // namespace
+
+Expected<Bytes> readFile(const std::filesystem::path& path) {
+    std::error_code problem;
+    if (!std::filesystem::is_regular_file(path, problem))
+        return fail(ErrorCode::Io, fmt::format("{}: there is no such file. Check the path.", path.string()));
+    const uintmax_t size = std::filesystem::file_size(path, problem);
+    if (problem) return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
+    if (size > file_bytes_max)
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: is larger than 2 GiB. Split it, or make it smaller.", path.string()));
+    Bytes bytes(static_cast<size_t>(size));
+    std::ifstream stream(path, std::ios::binary);
+    stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    if (!stream) return fail(ErrorCode::Io, fmt::format("{}: cannot be read. Check its permissions.", path.string()));
+    return bytes;
+}
 
 Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
     const std::string file = path.string();

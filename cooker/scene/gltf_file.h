@@ -5,8 +5,12 @@
 #include <tiny_gltf.h>
 
 #include <filesystem>
+#include <vector>
 
 namespace dimmer::cook {
+
+// A whole file of at most 2 GiB. Errors name it.
+Expected<std::vector<unsigned char>> readFile(const std::filesystem::path& path);
 
 // Reads .glb or .gltf (told apart by content) with its buffers. Images stay encoded: bytes of external and data-URI
 // images in tinygltf::Image::image (empty when unreadable), others in their buffer view.

@@ -4,10 +4,12 @@
 #include <scene/extras.h>
 #include <scene/gltf_check.h>
 #include <scene/gltf_file.h>
+#include <scene/ies_light.h>
 #include <scene/light.h>
 #include <scene/material.h>
 #include <scene/mesh.h>
 #include <scene/node_walk.h>
+#include <scene/sky.h>
 
 #include <algorithm>
 #include <new>
@@ -70,7 +72,8 @@ class LevelImporter {
         const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
         const std::string owner = context_.nodeLabel(at.node);
         const std::optional<int> light = lightOf(node);
-        const bool has_content = node.mesh >= 0 || light || node.camera >= 0 || node.name == player_start;
+        const bool shines = isLight(node);
+        const bool has_content = node.mesh >= 0 || shines || node.camera >= 0 || node.name == player_start;
         if (has_content && at.singular != -1) return singular(at, owner);
 
         const Extras extras = extrasOf(at, light);
@@ -81,9 +84,9 @@ class LevelImporter {
 
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
-        if (light)
-            if (const auto ok = this->light(at, *light, extras, owner); !ok) return ok;
-        if (node.mesh < 0 && !light)
+        if (shines)
+            if (const auto ok = this->light(at, light, extras, owner); !ok) return ok;
+        if (node.mesh < 0 && !shines)
             if (const auto ok = withoutMeshOrLight(at, extras, owner); !ok) return ok;
         if (node.camera >= 0 || node.name == player_start) return viewpoint(at);
         return {};
@@ -96,6 +99,8 @@ class LevelImporter {
         return context_.error(owner, whose + " is singular: it flattens space. Give every axis a scale other than 0.");
     }
 
+    static bool isLight(const tinygltf::Node& node) { return lightOf(node) || hasLightProfile(node); }
+
     // Blender's exporter hangs lights below a node "<object>_Orientation" of its own, while the custom properties stay
     // with the object.
     bool isOrientationOf(int node, int parent) const {
@@ -107,7 +112,7 @@ class LevelImporter {
         const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
         Extras extras(context_);
         extras.add(node.extras, context_.nodeLabel(at.node));
-        if (light && isOrientationOf(at.node, at.parent))
+        if (isLight(node) && isOrientationOf(at.node, at.parent))
             extras.add(model_.nodes[static_cast<size_t>(at.parent)].extras, context_.nodeLabel(at.parent));
         if (node.mesh >= 0)
             extras.add(model_.meshes[static_cast<size_t>(node.mesh)].extras, context_.meshLabel(node.mesh));
@@ -209,7 +214,7 @@ class LevelImporter {
         for (const EmissionGroup& group : *groups) {
             Expected<SceneMesh> mesh = meshes_->import(at.node, group.primitives, at.world_from_node);
             if (!mesh) return std::unexpected(mesh.error());
-            if (group.light_set && !isEmissiveMesh(*mesh) && !lightOf(model_.nodes[static_cast<size_t>(at.node)]))
+            if (group.light_set && !isEmissiveMesh(*mesh) && !isLight(model_.nodes[static_cast<size_t>(at.node)]))
                 return withoutLight(extras, owner);
             if (mesh->triangles.empty()) continue;
             any = true;
@@ -244,8 +249,12 @@ class LevelImporter {
                                           stated_by == owner ? "" : fmt::format(" (by {})", stated_by)));
     }
 
-    Expected<void> light(const PlacedNode& at, int light_index, const Extras& extras, const std::string& owner) {
-        Expected<PunctualLight> light = importLight(context_, light_index, at.node, at.world_from_node);
+    // A node with a profile may carry a punctual light besides, for programs that do not read profiles.
+    Expected<void> light(const PlacedNode& at, std::optional<int> punctual, const Extras& extras,
+                         const std::string& owner) {
+        const bool profile = hasLightProfile(model_.nodes[static_cast<size_t>(at.node)]);
+        Expected<PunctualLight> light = profile ? profiles_.place(at.node, at.world_from_node)
+                                                : importLight(context_, *punctual, at.node, at.world_from_node);
         if (!light) return std::unexpected(light.error());
         light->node = nodeName(at.node);
         const auto bake = extras.choice("dimmer_bake", {"indirect", "full", "none"});
@@ -255,10 +264,6 @@ class LevelImporter {
         const auto set = elements_.lightSet(extras, owner);
         if (!set) return std::unexpected(set.error());
         light->light_set = *set;
-        const tinygltf::Light& source = model_.lights[static_cast<size_t>(light_index)];
-        if (source.extensions.contains("EXT_lights_ies") ||
-            model_.nodes[static_cast<size_t>(at.node)].extensions.contains("EXT_lights_ies"))
-            context_.warn(owner, "its EXT_lights_ies profile is not supported yet and was ignored.");
         scene_.lights.push_back(std::move(*light));
         return {};
     }
@@ -266,7 +271,7 @@ class LevelImporter {
     Expected<void> withoutMeshOrLight(const PlacedNode& at, const Extras& extras, const std::string& owner) {
         const auto& children = model_.nodes[static_cast<size_t>(at.node)].children;
         const bool carries_light = std::ranges::any_of(children, [&](int child) {
-            return isOrientationOf(child, at.node) && lightOf(model_.nodes[static_cast<size_t>(child)]);
+            return isOrientationOf(child, at.node) && isLight(model_.nodes[static_cast<size_t>(child)]);
         });
         const auto set = extras.text("dimmer_light_set");
         if (!set) return std::unexpected(set.error());
@@ -293,25 +298,7 @@ class LevelImporter {
     Expected<void> sky() {
         Extras extras(context_);
         extras.add(sceneExtras(), "scene");
-        const auto color = extras.numbers("dimmer_sky_color", 3);
-        if (!color) return std::unexpected(color.error());
-        const auto luminance = extras.number("dimmer_sky_luminance");
-        if (!luminance) return std::unexpected(luminance.error());
-        if (extras.has("dimmer_sky_image"))
-            context_.warn("scene", "'dimmer_sky_image' is not supported yet and was ignored.");
-        if (color->has_value() != luminance->has_value()) {
-            context_.warn("scene", "the sky needs both 'dimmer_sky_color' and 'dimmer_sky_luminance'; it stays black.");
-            return {};
-        }
-        if (!*color) return {};
-        const glm::dvec3 c((**color)[0], (**color)[1], (**color)[2]);
-        const glm::dvec3 radiance = c * **luminance;
-        if (!isFinite(radiance) || **luminance < 0 || glm::any(glm::lessThan(c, glm::dvec3(0))))
-            return context_.error("scene",
-                                  "'dimmer_sky_color' times 'dimmer_sky_luminance' is negative or infinite. Correct "
-                                  "them.");
-        scene_.sky_radiance_cd_m2 = radiance;
-        return {};
+        return importSky(context_, extras);
     }
 
     Expected<void> conclude() {
@@ -329,6 +316,7 @@ class LevelImporter {
     Scene scene_;
     ImportContext context_{model_, scene_};
     Elements elements_{context_};
+    LightProfiles profiles_{context_};
     std::optional<MeshImporter> meshes_;
     std::vector<std::optional<uint32_t>> door_of_node_;
 };

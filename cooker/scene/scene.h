@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -63,6 +64,8 @@ struct SceneMesh {
     std::optional<float> grid_spacing_m;
 };
 
+struct LightProfile;  // scene/ies.h
+
 enum class LightType { Point, Spot, Directional };
 enum class BakeMode { Indirect, Full, None };
 
@@ -72,7 +75,10 @@ struct PunctualLight {
     glm::vec3 position_m{0};
     glm::vec3 direction{0, 0, -1};  // the way the light travels, unit
     glm::vec3 intensity{0};         // candela (point, spot) or lux on a facing surface (directional)
-    std::optional<float> range_m;   // windows with clamp(1 - (d / range)^4, 0, 1)
+    // EXT_lights_ies: `intensity` is the peak's, and this the share of it by direction; null: the same all around.
+    std::shared_ptr<const LightProfile> profile;
+    glm::mat3 profile_from_world{1};  // rotation, mirrored where the node is
+    std::optional<float> range_m;     // windows with clamp(1 - (d / range)^4, 0, 1)
     float cone_inner_cos = 1, cone_outer_cos = 0.70710678f;
     BakeMode bake = BakeMode::Indirect;
     std::optional<uint32_t> light_set;
@@ -114,7 +120,9 @@ struct Scene {
     std::vector<std::vector<ElementRef>> combinations;
     std::vector<SceneViewpoint> viewpoints;   // "player_start" first when there is one, then glTF cameras
     std::vector<glm::vec3> dynamic_places_m;  // dimmer_dynamic on an empty node
-    glm::vec3 sky_radiance_cd_m2{0};
+    glm::vec3 sky_radiance_cd_m2{0};          // of the whole sky; with an image: what its texels are multiplied by
+    // Equirectangular, rows from the top (+Y); the middle column is +X, to its right comes +Z. Null: a constant sky.
+    std::shared_ptr<const Image> sky_image;
     std::vector<std::string> warnings;  // each names the file, the node and what was done
 };
 

@@ -142,7 +142,9 @@ class Writer {
                               .page_height = d_.page_height,
                               .page_count = d_.page_count,
                               .chunk_count = static_cast<uint32_t>(chunks_.size()),
-                              .reserved = {}};
+                              .color_format = static_cast<uint32_t>(d_.color_format),
+                              .direction_model = static_cast<uint32_t>(d_.direction_model),
+                              .reserved = 0};
         header.xxh64 = format::headerHash(header, std::as_bytes(std::span(chunks_)));
         std::vector<std::byte> file(end);
         std::memcpy(file.data(), &header, sizeof(header));
@@ -188,6 +190,7 @@ bool giveUsualRights(int file) {
 }
 
 Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+    const std::scoped_lock lock(fileReplacement());
     std::string temporary = path.string() + ".XXXXXX";
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
@@ -204,6 +207,11 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
 
 std::vector<std::byte> packBytes(const PackData& data) {
     return Writer(data).write();
+}
+
+std::mutex& fileReplacement() {
+    static std::mutex mutex;
+    return mutex;
 }
 
 Expected<void> checkWritable(const std::filesystem::path& path) {

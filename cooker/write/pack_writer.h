@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -15,6 +16,9 @@ std::vector<std::byte> packBytes(const PackData& data);
 
 // Whether a file of that name can be expected to be writable; asked before hours of work, not after.
 Expected<void> checkWritable(const std::filesystem::path& path);
+
+// Held while writeFileAtomically() has a temporary file: who ends the process from another thread takes it first.
+std::mutex& fileReplacement();
 
 // Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete. Links are
 // followed; devices and pipes are written to directly.

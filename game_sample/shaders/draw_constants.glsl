@@ -3,10 +3,12 @@
 #define DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
 
 #ifdef __cplusplus
+#include <cstdint>
 #include <glm/glm.hpp>
 namespace dimmer::sample {
 using glm::mat4;
 using glm::vec3;
+using uint = uint32_t;
 #endif
 
 struct DrawConstants {
@@ -15,10 +17,11 @@ struct DrawConstants {
     float page;           // of the lightmap
     vec3 emission_cd_m2;  // times the weight of its light set
     float exposure;       // Pack::exposure()
+    uint direction_model;  // Pack::directionModel()
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(DrawConstants) == 96);  // every device takes 128
+static_assert(sizeof(DrawConstants) == 100);  // every device takes 128
 }  // namespace dimmer::sample
 #endif
 

@@ -21,6 +21,6 @@ const float INVERSE_PI = 0.318309886;
 void main() {
     // No normal maps here: the shading normal is the texel's own, +Z of its tangent frame.
     vec3 irradiance_lux = dimmer_lightmap_irradiance(irradiance_pages, direction_pages, vec3(lightmap_uv, draw.page),
-                                                     vec3(0.0, 0.0, 1.0), draw.exposure);
+                                                     vec3(0.0, 0.0, 1.0), draw.exposure, draw.direction_model);
     radiance_cd_m2 = vec4(draw.reflectance * INVERSE_PI * irradiance_lux + draw.emission_cd_m2, 1.0);
 }

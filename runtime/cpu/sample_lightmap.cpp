@@ -26,8 +26,8 @@ Tap tap(float coordinate, uint32_t size) {
 // What the sampler returns: stored irradiance, and the three codes of the direction as unorm.
 using Sample = std::array<float, 6>;
 
-Sample decode(uint32_t irradiance, uint32_t direction) {
-    const auto [r, g, b] = decodeR11G11B10(irradiance);
+Sample decode(ColorFormat format, uint32_t irradiance, uint32_t direction) {
+    const auto [r, g, b] = decodeColor(format, irradiance);
     constexpr float unorm = 1.0f / 1023.0f;
     return {r,
             g,
@@ -52,7 +52,7 @@ std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> 
     const Tap x = tap(uv[0], pack.pageWidth()), y = tap(uv[1], pack.pageHeight());
     auto texel = [&](uint32_t tx, uint32_t ty) {
         const size_t i = (size_t{page} * pack.pageHeight() + ty) * pack.pageWidth() + tx;
-        return decode(irradiance_pages[i], direction_pages[i]);
+        return decode(pack.colorFormat(), irradiance_pages[i], direction_pages[i]);
     };
     const Sample s = mix(mix(texel(x.first, y.first), texel(x.second, y.first), x.second_share),
                          mix(texel(x.first, y.second), texel(x.second, y.second), x.second_share), y.second_share);
@@ -60,7 +60,9 @@ std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> 
     const Highlight h = highlightFromUnorm(s[3], s[4], s[5]);
     const float highlight =
         h.bx * normal_tangent[0] + h.by * normal_tangent[1] + (1.0f - h.ambient) * normal_tangent[2];
-    const float scale = (h.ambient + std::max(0.0f, highlight)) / pack.exposure();
+    const float falloff = pack.directionModel() == DirectionModel::Ahd ? h.ambient + std::max(0.0f, highlight)
+                                                                       : std::max(0.0f, h.ambient + highlight);
+    const float scale = falloff / pack.exposure();
     return {s[0] * scale, s[1] * scale, s[2] * scale};
 }
 

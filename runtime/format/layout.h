@@ -8,7 +8,7 @@
 namespace dimmer::format {
 
 inline constexpr std::array<char, 8> magic = {'D', 'I', 'M', 'M', 'E', 'R', '\r', '\n'};
-inline constexpr uint32_t version = 2;
+inline constexpr uint32_t version = 3;
 inline constexpr uint32_t endian_tag = 0x01020304;
 inline constexpr uint64_t chunk_alignment_bytes = 64;
 
@@ -44,7 +44,8 @@ struct Header {
     float exposure;
     uint32_t page_width, page_height, page_count;
     uint32_t chunk_count;
-    uint32_t reserved[3];
+    uint32_t color_format, direction_model;
+    uint32_t reserved;
 };
 static_assert(sizeof(Header) == 64);
 

@@ -1,15 +1,18 @@
 // The 8-byte lightmap texel and its arithmetic. GLSL twin, function by function: shaders/include/dimmer/texel.glsl.
 // Both round alike wherever the device's +, * and / are IEEE, so executors can be compared bit for bit.
 //
-//   irradiance  B10G11R11_UFLOAT_PACK32: E_z, irradiance on the texel's own normal, lux * exposure. Steps of 1/64
-//               (r, g) and 1/32 (b) of the value; largest 65024 and 64512; rounded to nearest even; below 2^-14 it is
-//               0, as some devices flush what is less; never NaN.
+//   irradiance  E_z, irradiance on the texel's own normal, lux * exposure, in one of two formats:
+//               B10G11R11_UFLOAT_PACK32: steps of 1/64 (r, g) and 1/32 (b) of the value; largest 65024 and 64512;
+//               rounded to nearest even; below 2^-14 it is 0, as some devices flush what is less; never NaN.
+//               E5B9G9R9_UFLOAT_PACK32: three 9-bit mantissas under one exponent, that of the largest channel: steps
+//               of 1/512 to 1/256 of that channel, 2^-24 at the least; largest 65408; rounded to nearest, ties up.
 //   direction   A2B10G10R10_UNORM_PACK32, all linear: r = c0 / 1023, the ambient share; b_x, b_y = (c - 512) 5/256,
 //               the highlight's moment; the top 2 bits are spare (0).
 //
-// The model ("ahd"): E(n) = E_z (r + (1-r) max(0, n.d) / d_z), a unit direction d with d_z >= 0.1. With the moment
+// The model "ahd": E(n) = E_z (r + (1-r) max(0, n.d) / d_z), a unit direction d with d_z >= 0.1. With the moment
 // b = (1-r) d_xy / d_z it reads E(n) = E_z (r + max(0, b.n_xy + (1-r) n_z)); E_z r and E_z b add linearly, so a sum of
 // texels has the mean of their direction codes, weighted with luminance: neither decoding nor encoding is needed.
+// The model "linear" has the same moments and clamps their sum instead: E(n) = E_z max(0, r + b.n_xy + (1-r) n_z).
 #pragma once
 
 #include <pack/pack_data.h>
@@ -68,6 +71,46 @@ inline uint32_t canonicalR11G11B10(uint32_t code) {
     return channel(0, 6, 0x7ff) | channel(11, 6, 0x7ff) | channel(22, 5, 0x3ff);
 }
 
+inline constexpr float e5b9g9r9_largest = 65408;  // 511 * 2^7
+
+// 2^(exponent field - 24): what one step of the mantissas is worth.
+inline float stepE5B9G9R9(uint32_t code) {
+    return std::bit_cast<float>(((code >> 27) + 103) << 23);
+}
+
+// NaN and negative give 0; too large gives the largest. `exponent`: value * 2^exponent is what is encoded.
+inline uint32_t encodeE5B9G9R9(float r, float g, float b, int exponent = 0) {
+    const float limit =
+        std::bit_cast<float>(std::bit_cast<uint32_t>(e5b9g9r9_largest) - (static_cast<uint32_t>(exponent) << 23));
+    const auto clamped = [limit](float v) { return v > 0 ? std::min(v, limit) : 0.0f; };
+    const float cr = clamped(r), cg = clamped(g), cb = clamped(b);
+    // Half a step of 9 bits up, so that a mantissa which rounds to 512 takes the next exponent.
+    const uint32_t bits = std::bit_cast<uint32_t>(std::max(cr, std::max(cg, cb))) + (1u << 14);
+    const auto lowest = static_cast<uint32_t>(111 - exponent);  // a float's exponent where the format's is 0
+    const uint32_t field = std::max(bits >> 23, lowest);
+    const float steps = std::bit_cast<float>((262 - field) << 23);  // 1 / step
+    const auto code = [steps](float v) { return static_cast<uint32_t>(static_cast<int>(v * steps + 0.5f)); };
+    return code(cr) | code(cg) << 9 | code(cb) << 18 | (field - lowest) << 27;
+}
+
+inline std::array<float, 3> decodeE5B9G9R9(uint32_t code) {
+    const float step = stepE5B9G9R9(code);
+    const auto channel = [step](uint32_t c) { return static_cast<float>(static_cast<int>(c & 0x1ffu)) * step; };
+    return {channel(code), channel(code >> 9), channel(code >> 18)};
+}
+
+inline uint32_t encodeColor(ColorFormat format, float r, float g, float b) {
+    return format == ColorFormat::R11G11B10F ? encodeR11G11B10(r, g, b) : encodeE5B9G9R9(r, g, b);
+}
+inline std::array<float, 3> decodeColor(ColorFormat format, uint32_t code) {
+    return format == ColorFormat::R11G11B10F ? decodeR11G11B10(code) : decodeE5B9G9R9(code);
+}
+// Executors see only what this returns. Every code of E5B9G9R9 is a finite number.
+inline TexelRecord canonical(ColorFormat format, const TexelRecord& record) {
+    if (format == ColorFormat::E5B9G9R9) return record;
+    return {canonicalR11G11B10(record.irradiance), record.direction};
+}
+
 // The directional part of a texel: ambient share and the highlight's moment b (see above).
 struct Highlight {
     float ambient = 1;
@@ -96,26 +139,28 @@ inline uint32_t encodeDirection(float l, float ambient, float bx, float by) {
     return code(ambient / l * 1023.0f) | code(bx * to_steps + 512.0f) << 10 | code(by * to_steps + 512.0f) << 20;
 }
 
-// Records meet weights that carry this factor: it lifts a channel's bits, moved to a float's exponent as they stand
-// (2^-126 and up), to its value times 2^-12, in one multiplication and for weights up to 2^28.
-inline constexpr float weight_scale = 0x1p100f;
 inline constexpr int blend_exponent = 12;  // sums are 2^-12 of the value
+// Records meet weights that carry this factor. For R11G11B10F it lifts a channel's bits, moved to a float's exponent as
+// they stand (2^-126 and up), to its value times 2^-12, in one multiplication and for weights up to 2^28.
+inline constexpr float weightScale(ColorFormat format) {
+    return format == ColorFormat::R11G11B10F ? 0x1p100f : 0x1p-12f;
+}
 // Luminances of sums outside these have no direction (2^-20 and 2^40 of the value): black, or so bright that the
 // products below could overflow, when irradiance has saturated long before.
 inline constexpr float blend_luminance_min = 0x1p-32f, blend_luminance_max = 0x1p28f;
 
 // Sums records with weights in 32-bit floats and encodes once. Order of the calls is part of the result.
+template <ColorFormat format = ColorFormat::R11G11B10F>
 struct TexelBlend {
     float r = 0, g = 0, b = 0;
     float l = 0;
     float d0 = 0, d1 = 0, d2 = 0;  // sums of l * code, the codes where they stand in the 32 bits
 
-    // `record`: canonical; `wr`, `wg`, `wb`: weights times weight_scale.
+    // `record`: canonical; `wr`, `wg`, `wb`: weights times weightScale(format).
     void add(TexelRecord record, float wr, float wg, float wb) {
-        const uint32_t e = record.irradiance, d = record.direction;
-        const float cr = wr * std::bit_cast<float>((e & 0x7ffu) << 17);
-        const float cg = wg * std::bit_cast<float>(e << 6 & 0xffe0000u);
-        const float cb = wb * std::bit_cast<float>(e >> 4 & 0xffc0000u);
+        const uint32_t d = record.direction;
+        const auto lifted = lift(record.irradiance);
+        const float cr = wr * lifted[0], cg = wg * lifted[1], cb = wb * lifted[2];
         const float cl = luminance(cr, cg, cb);
         r += cr;
         g += cg;
@@ -125,13 +170,19 @@ struct TexelBlend {
         d1 += cl * static_cast<float>(static_cast<int>(d & 0xffc00u));
         d2 += cl * static_cast<float>(static_cast<int>(d & 0x3ff00000u));
     }
-    TexelRecord encode() const {
-        return {encodeUfloat<6>(r, blend_exponent) | encodeUfloat<6>(g, blend_exponent) << 11 |
-                    encodeUfloat<5>(b, blend_exponent) << 22,
-                encodeMean()};
-    }
+    TexelRecord encode() const { return {encodeSum(), encodeMean()}; }
 
    private:
+    static std::array<float, 3> lift(uint32_t code) {
+        if constexpr (format == ColorFormat::E5B9G9R9) return decodeE5B9G9R9(code);
+        return {std::bit_cast<float>((code & 0x7ffu) << 17), std::bit_cast<float>(code << 6 & 0xffe0000u),
+                std::bit_cast<float>(code >> 4 & 0xffc0000u)};
+    }
+    uint32_t encodeSum() const {
+        if constexpr (format == ColorFormat::E5B9G9R9) return encodeE5B9G9R9(r, g, b, blend_exponent);
+        return encodeUfloat<6>(r, blend_exponent) | encodeUfloat<6>(g, blend_exponent) << 11 |
+               encodeUfloat<5>(b, blend_exponent) << 22;
+    }
     uint32_t encodeMean() const {
         // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
         const bool usable = l >= blend_luminance_min && l <= blend_luminance_max;

@@ -11,7 +11,6 @@
 namespace dimmer {
 namespace {
 
-constexpr VkFormat irradiance_format = VK_FORMAT_B10G11R11_UFLOAT_PACK32;
 constexpr VkFormat direction_format = VK_FORMAT_A2B10G10R10_UNORM_PACK32;
 constexpr VkFormat storage_format = VK_FORMAT_R32_UINT;
 
@@ -19,6 +18,16 @@ constexpr VkFormat storage_format = VK_FORMAT_R32_UINT;
 constexpr VkImageCreateFlags image_flags = VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT | VK_IMAGE_CREATE_EXTENDED_USAGE_BIT;
 constexpr VkImageUsageFlags image_usage = VK_IMAGE_USAGE_SAMPLED_BIT | VK_IMAGE_USAGE_STORAGE_BIT |
                                           VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
+
+struct NamedFormat {
+    VkFormat format;
+    const char* name;
+};
+
+NamedFormat irradianceFormat(ColorFormat format) {
+    if (format == ColorFormat::E5B9G9R9) return {VK_FORMAT_E5B9G9R9_UFLOAT_PACK32, "E5B9G9R9_UFLOAT_PACK32"};
+    return {VK_FORMAT_B10G11R11_UFLOAT_PACK32, "B10G11R11_UFLOAT_PACK32"};
+}
 
 VkFormatFeatureFlags imageFeatures(VkPhysicalDevice device, VkFormat format) {
     VkFormatProperties properties;
@@ -81,12 +90,13 @@ Expected<LightmapPages> LightmapPages::create(const VulkanContext& vulkan, const
     pages.height_ = data.page_height;
     pages.layers_ = data.page_count;
     pages.sampling_stages_ = samplingStages(vulkan);
-    DIMMER_TRY(
-        checkSupport(vulkan, irradiance_format, "B10G11R11_UFLOAT_PACK32", pages.width_, pages.height_, pages.layers_));
+    const NamedFormat irradiance_format = irradianceFormat(data.color_format);
+    DIMMER_TRY(checkSupport(vulkan, irradiance_format.format, irradiance_format.name, pages.width_, pages.height_,
+                            pages.layers_));
     DIMMER_TRY(
         checkSupport(vulkan, direction_format, "A2B10G10R10_UNORM_PACK32", pages.width_, pages.height_, pages.layers_));
 
-    auto irradiance = pages.createArray(vulkan, irradiance_format);
+    auto irradiance = pages.createArray(vulkan, irradiance_format.format);
     if (!irradiance) return std::unexpected(std::move(irradiance.error()));
     pages.irradiance_ = std::move(*irradiance);
     auto direction = pages.createArray(vulkan, direction_format);
@@ -212,7 +222,7 @@ Expected<void> LightmapPages::fill(const PackData& data, Transfer& transfer) {
         DIMMER_TRY(forEachPiece([&](const VkBufferImageCopy& region, size_t first, size_t count) {
             for (size_t i = 0; i < count; ++i) {
                 const TexelRecord& record = data.base_pages[first + i];
-                staging[i] = irradiance ? canonicalR11G11B10(record.irradiance) : record.direction;
+                staging[i] = irradiance ? canonical(data.color_format, record).irradiance : record.direction;
             }
             return transfer.run([&](VkCommandBuffer commands) {
                 vkCmdCopyBufferToImage(commands, transfer.staging().buffer.get(), image,

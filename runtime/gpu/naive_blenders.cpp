@@ -64,7 +64,7 @@ Expected<GatherBlender> GatherBlender::create(const VulkanContext& vulkan, const
     std::vector<uint16_t> contributions;
     std::vector<uint32_t> first_record(data.addresses.size() + 1, 0);
     forEachRecord(data, [&](uint32_t receiver, const ClusterTerm& term, uint32_t record) {
-        records.push_back(canonical(data.payload[record]));
+        records.push_back(canonical(data.color_format, data.payload[record]));
         contributions.push_back(static_cast<uint16_t>(term.contribution));
         first_record[receiver + 1] = static_cast<uint32_t>(records.size());
     });
@@ -94,7 +94,8 @@ Expected<GatherBlender> GatherBlender::create(const VulkanContext& vulkan, const
         KernelBinding::ofImage(pages.irradianceStorageView()),
         KernelBinding::ofImage(pages.directionStorageView()),
     };
-    const Specialisation pipelines[] = {{}};
+    const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
+    blender.weight_scale_ = weightScale(data.color_format);
     auto kernel = Kernel::create(vulkan.device, spirv::gather_texels_comp, bindings, sizeof(uint32_t), pipelines);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
@@ -105,7 +106,7 @@ void GatherBlender::write(const Planner& planner, uint32_t) {
     auto* weights = reinterpret_cast<WorkTerm*>(weights_.buffer.mapped);
     for (uint32_t k = 0; k < planner.contributionCount(); ++k) {
         const Weight& w = planner.plannedWeight(k);
-        weights[k] = {0, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale};
+        weights[k] = {0, w.r * weight_scale_, w.g * weight_scale_, w.b * weight_scale_};
     }
 }
 
@@ -133,7 +134,7 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     forEachRecord(data, [&](uint32_t receiver, const ClusterTerm&, uint32_t record) { receivers[record] = receiver; });
     std::vector<TexelRecord> records;
     records.reserve(data.payload.size());
-    for (const TexelRecord& record : data.payload) records.push_back(canonical(record));
+    for (const TexelRecord& record : data.payload) records.push_back(canonical(data.color_format, record));
 
     ScatterBlender blender;
     blender.receivers_ = static_cast<uint32_t>(data.addresses.size());
@@ -159,7 +160,9 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
         KernelBinding::ofImage(pages.irradianceStorageView()),
         KernelBinding::ofImage(pages.directionStorageView()),
     };
-    const Specialisation passes[] = {{0}, {1}, {2}};
+    const auto format = static_cast<uint32_t>(data.color_format);
+    blender.weight_scale_ = weightScale(data.color_format);
+    const Specialisation passes[] = {{0, format}, {1, format}, {2, format}};
     auto kernel = Kernel::create(vulkan.device, spirv::scatter_texels_comp, bindings, 5 * sizeof(uint32_t), passes);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
@@ -190,7 +193,8 @@ uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& plann
     for (uint32_t k = 0; k < parts_.size(); ++k) {
         const Weight& w = planner.plannedWeight(k);
         if (w == Weight(0)) continue;
-        pass(1, {parts_[k].count, parts_[k].first_record, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale});
+        pass(1,
+             {parts_[k].count, parts_[k].first_record, w.r * weight_scale_, w.g * weight_scale_, w.b * weight_scale_});
     }
     pass(2, {receivers_, 0, 0, 0, 0});
     return dispatches;

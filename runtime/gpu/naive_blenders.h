@@ -21,6 +21,7 @@ class GatherBlender : public TexelExecutor {
     TexelBuffer addresses_, base_, payload_, contributions_, first_record_, weights_;
     Kernel kernel_;
     uint32_t receivers_ = 0, groups_x_max_ = 0;
+    float weight_scale_ = 1;
 };
 
 // One pass per contribution over 32-bit sums; shaders/scatter_texels.comp.
@@ -42,6 +43,7 @@ class ScatterBlender : public TexelExecutor {
     Kernel kernel_;
     std::vector<Part> parts_;  // per contribution
     uint32_t receivers_ = 0, groups_x_max_ = 0;
+    float weight_scale_ = 1;
 };
 
 }  // namespace dimmer

@@ -44,8 +44,9 @@ std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) 
     return runs;
 }
 
-Specialisation specialisationOf(uint32_t group) {
-    return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size};
+Specialisation specialisationOf(uint32_t group, ColorFormat format) {
+    return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
+            static_cast<uint32_t>(format)};
 }
 
 Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
@@ -83,7 +84,7 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
     DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
     for (size_t i = 0; i < page_sets.size(); ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
-    DIMMER_TRY(blender.createKernel(vulkan.device, planner, page_sets));
+    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, page_sets));
     return blender;
 }
 
@@ -122,12 +123,12 @@ Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Plann
     return {};
 }
 
-Expected<void> TexelBlender::createKernel(VkDevice device, const Planner& planner,
+Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
                                           std::span<const LightmapPages> page_sets) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
-        pipelines.push_back(specialisationOf(group));
+        pipelines.push_back(specialisationOf(group, format));
     std::vector<KernelBinding> bindings;
     for (size_t i = 0; i < page_sets.size(); ++i)
         bindings.insert(bindings.end(), {

@@ -69,6 +69,14 @@ uint32_t Pack::pageWidth() const {
 uint32_t Pack::pageHeight() const {
     return data_->page_height;
 }
+ColorFormat Pack::colorFormat() const {
+    return data_->color_format;
+}
+
+DirectionModel Pack::directionModel() const {
+    return data_->direction_model;
+}
+
 float Pack::exposure() const {
     return data_->exposure;
 }

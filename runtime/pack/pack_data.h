@@ -11,7 +11,7 @@ namespace dimmer {
 
 // A stored lightmap texel, 8 bytes; see runtime/format/texel.h.
 struct TexelRecord {
-    uint32_t irradiance = 0;  // B10G11R11_UFLOAT_PACK32
+    uint32_t irradiance = 0;  // in the pack's ColorFormat
     uint32_t direction = 0;   // A2B10G10R10_UNORM_PACK32
     bool operator==(const TexelRecord&) const = default;
 };
@@ -49,6 +49,8 @@ inline constexpr uint32_t page_count_max = 256;
 
 struct PackData {
     float exposure = 1;
+    ColorFormat color_format = ColorFormat::R11G11B10F;
+    DirectionModel direction_model = DirectionModel::Ahd;
     uint32_t page_width = 0, page_height = 0, page_count = 0;
     std::vector<Element> elements;            // light sets first, then doors
     std::vector<Contribution> contributions;  // without the base

@@ -53,6 +53,8 @@ class Reader {
         if (auto ok = readTable(); !ok) return std::unexpected(ok.error());
         PackData d;
         d.exposure = header_.exposure;
+        d.color_format = static_cast<ColorFormat>(header_.color_format);
+        d.direction_model = static_cast<DirectionModel>(header_.direction_model);
         d.page_width = header_.page_width;
         d.page_height = header_.page_height;
         d.page_count = header_.page_count;

@@ -27,6 +27,10 @@ Expected<void> validatePages(const PackData& d) {
     const uint64_t texels = uint64_t{d.page_count} * d.page_width * d.page_height;
     if (d.base_pages.size() != texels)
         return bad("its base holds {} texels, its pages {}", d.base_pages.size(), texels);
+    if (d.color_format != ColorFormat::R11G11B10F && d.color_format != ColorFormat::E5B9G9R9)
+        return bad("its colour format {} is unknown", static_cast<uint32_t>(d.color_format));
+    if (d.direction_model != DirectionModel::Ahd && d.direction_model != DirectionModel::Linear)
+        return bad("its directional model {} is unknown", static_cast<uint32_t>(d.direction_model));
     if (!std::isfinite(d.exposure) || d.exposure <= 0) return bad("its exposure is {}", d.exposure);
     return {};
 }

@@ -22,10 +22,18 @@ Lists<T> makeLists(size_t list_count, ForEachPair&& for_each_pair) {
     return lists;
 }
 
-// The step between codes at a value of the base: a power of two, that of the smallest normal number where it is black.
-float stepAt(float value, int mantissa_bits) {
-    const float binade = std::bit_cast<float>(std::bit_cast<uint32_t>(std::max(value, 0x1p-14f)) & 0x7f800000u);
-    return binade / static_cast<float>(1 << mantissa_bits);
+// The step between codes, a power of two, at a value of the base; where it is black, that of the smallest number.
+std::array<float, 3> stepsAt(ColorFormat format, uint32_t base) {
+    if (format == ColorFormat::E5B9G9R9) {
+        const float step = stepE5B9G9R9(base);  // all channels share the largest one's
+        return {step, step, step};
+    }
+    const auto step = [](float value, float mantissa_steps) {
+        const uint32_t binade = std::bit_cast<uint32_t>(std::max(value, 0x1p-14f)) & 0x7f800000u;
+        return std::bit_cast<float>(binade) / mantissa_steps;
+    };
+    const auto light = decodeR11G11B10(base);
+    return {step(light[0], 64), step(light[1], 64), step(light[2], 32)};
 }
 
 }  // namespace
@@ -50,19 +58,18 @@ PlanTables::PlanTables(const PackData& data) {
 }
 
 std::vector<float> quantaPerWeight(const PackData& data) {
-    constexpr std::array<int, 3> mantissa_bits = {6, 6, 5};
+    const ColorFormat format = data.color_format;
     std::vector<float> quanta(data.terms.size(), 0);
     for (const Cluster& c : data.clusters)
         for (uint32_t i = 0; i < c.receiver_count; ++i) {
             const uint32_t address = data.addresses[c.first_receiver + i];
             const size_t row = size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address);
             const TexelRecord& base = data.base_pages[row * data.page_width + TexelAddress::x(address)];
-            const auto base_light = decodeR11G11B10(canonicalR11G11B10(base.irradiance));
+            const auto steps = stepsAt(format, canonical(format, base).irradiance);
             for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) {
-                const uint32_t code = canonicalR11G11B10(data.payload[data.terms[t].first_record + i].irradiance);
-                const auto light = decodeR11G11B10(code);
-                for (size_t n = 0; n < 3; ++n)
-                    quanta[t] = std::max(quanta[t], light[n] / stepAt(base_light[n], mantissa_bits[n]));
+                const TexelRecord& record = data.payload[data.terms[t].first_record + i];
+                const auto light = decodeColor(format, canonical(format, record).irradiance);
+                for (size_t n = 0; n < 3; ++n) quanta[t] = std::max(quanta[t], light[n] / steps[n]);
             }
         }
     return quanta;

@@ -195,9 +195,10 @@ void Planner::takeWithin(uint32_t receivers) {
 void Planner::planPart(Part& part) {
     const Cluster& cluster = data_.clusters[part.cluster];
     part.first_term = static_cast<uint32_t>(terms_.size());
+    const float scale = weightScale(data_.color_format);
     for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
         const Weight& w = planned_[data_.terms[t].contribution];
-        if (isOn(w)) terms_.push_back({t, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale});
+        if (isOn(w)) terms_.push_back({t, w.r * scale, w.g * scale, w.b * scale});
     }
     part.term_count = static_cast<uint32_t>(terms_.size()) - part.first_term;
     uint64_t receivers = cluster.receiver_count;

@@ -1,6 +1,7 @@
 // Runs a tool as a user's shell would.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ struct ProcessResult {
 // Waits for the end. `input` is what it reads on stdin.
 ProcessResult runProcess(const std::string& program, const std::vector<std::string>& arguments,
                          const std::string& input = "");
+
+// Sends `signal` as soon as `when`, asked again and again with what stderr holds so far, says so.
+ProcessResult runInterrupted(const std::string& program, const std::vector<std::string>& arguments, int signal,
+                             const std::function<bool(const std::string& err)>& when);
 
 inline ProcessResult runDimmer(const std::vector<std::string>& arguments, const std::string& input = "") {
     return runProcess(DIMMER_TOOL, arguments, input);

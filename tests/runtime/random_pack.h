@@ -41,13 +41,21 @@ inline uint32_t randomIrradiance(Random& random, float exposure) {
     return floorUfloatCode(stored(), 6) | floorUfloatCode(stored(), 6) << 11 | floorUfloatCode(stored(), 5) << 22;
 }
 
+// 1e-3..1e5 lux in the largest channel at an exposure of 1/64; any mantissas.
+inline uint32_t randomSharedExponent(Random& random) {
+    if (pick(random, 0, 30) == 0) return 0;
+    return static_cast<uint32_t>(random() & 0x7ffffff) | pick(random, 2, 26) << 27;
+}
+
 // Any ambient share, and a highlight that may point along the surface or past what the share allows.
 inline uint32_t randomDirection(Random& random) {
     return pick(random, 0, 1023) | pick(random, 1, 1023) << 10 | pick(random, 1, 1023) << 20;
 }
 
-inline TexelRecord randomRecord(Random& random, float exposure) {
-    return {randomIrradiance(random, exposure), randomDirection(random)};
+inline TexelRecord randomRecord(Random& random, float exposure, ColorFormat format = ColorFormat::R11G11B10F) {
+    const uint32_t irradiance =
+        format == ColorFormat::E5B9G9R9 ? randomSharedExponent(random) : randomIrradiance(random, exposure);
+    return {irradiance, randomDirection(random)};
 }
 
 // A cluster to build: which contributions and how many receivers.
@@ -61,7 +69,7 @@ struct ClusterPlan {
 inline void fillPack(PackData& data, std::span<const ClusterPlan> plans, Random& random,
                      uint32_t batch_size = batch_receivers_max) {
     data.base_pages.resize(size_t{data.page_count} * data.page_width * data.page_height);
-    for (TexelRecord& record : data.base_pages) record = randomRecord(random, data.exposure);
+    for (TexelRecord& record : data.base_pages) record = randomRecord(random, data.exposure, data.color_format);
 
     std::vector<uint32_t> texels(data.base_pages.size());
     std::iota(texels.begin(), texels.end(), 0u);
@@ -94,7 +102,7 @@ inline void fillPack(PackData& data, std::span<const ClusterPlan> plans, Random&
     for (size_t k = 0; k < data.contributions.size(); ++k) first[k + 1] = first[k] + data.contributions[k].receivers;
     for (ClusterTerm& term : data.terms) term.first_record += first[term.contribution];
     data.payload.resize(first.back());
-    for (TexelRecord& record : data.payload) record = randomRecord(random, data.exposure);
+    for (TexelRecord& record : data.payload) record = randomRecord(random, data.exposure, data.color_format);
 }
 
 // Light sets "set0".. and doors "door0"..; for every set a contribution, and some through open, off closed and through
@@ -125,11 +133,13 @@ struct RandomPackOptions {
     uint32_t sets = 9, doors = 3, clusters = 40;
     uint32_t overlap_max = 12;
     uint32_t page_count = 2, page_side = 64;
+    ColorFormat color_format = ColorFormat::R11G11B10F;
 };
 
 inline PackData randomPack(uint32_t seed, const RandomPackOptions& options = {}) {
     Random random(seed);
     PackData data = emptyPack(options.sets, options.doors);
+    data.color_format = options.color_format;
     data.page_count = options.page_count;
     data.page_width = options.page_side;
     data.page_height = options.page_side;

@@ -143,8 +143,10 @@ class Sampler {
 };
 
 // Two pages of smooth light with highlights well off the surface; no dynamic light is needed here.
-Pack smoothPack() {
+Pack smoothPack(ColorFormat format, DirectionModel model) {
     PackData data;
+    data.color_format = format;
+    data.direction_model = model;
     data.exposure = 0.25f;
     data.page_count = 2;
     data.page_width = 16;
@@ -153,9 +155,11 @@ Pack smoothPack() {
         for (uint32_t y = 0; y < 8; ++y)
             for (uint32_t x = 0; x < 16; ++x) {
                 // r = 0.25, |b_x| and |b_y| at most 0.7 of a share of 0.75.
-                const uint32_t irradiance = test::floorUfloatCode(10 + x + 50 * page, 6) |
-                                            test::floorUfloatCode(20 + y, 6) << 11 |
-                                            test::floorUfloatCode(30 - x, 5) << 22;
+                const uint32_t r = 10 + x + 50 * page, g = 20 + y, b = 30 - x;
+                const uint32_t irradiance = format == ColorFormat::E5B9G9R9
+                                                ? 4 * r | 4 * g << 9 | 4 * b << 18 | 22u << 27  // steps of a quarter
+                                                : test::floorUfloatCode(r, 6) | test::floorUfloatCode(g, 6) << 11 |
+                                                      test::floorUfloatCode(b, 5) << 22;
                 data.base_pages.push_back({irradiance, 256u | (512 - 27 + 3 * x) << 10 | (512 - 27 + 6 * y) << 20});
             }
     return valueOf(Pack::fromData(std::move(data)));
@@ -170,7 +174,12 @@ class SampleGlslTest : public test::GpuTest {
    protected:
     // Samples at `uvs` of both pages for several normals on both executors.
     void expectAgreement(const std::vector<std::array<float, 2>>& uvs, const Tolerance& tolerance) {
-        const Pack pack = smoothPack();
+        for (const auto format : {ColorFormat::R11G11B10F, ColorFormat::E5B9G9R9})
+            for (const auto model : {DirectionModel::Ahd, DirectionModel::Linear})
+                expectAgreement(smoothPack(format, model), uvs, tolerance);
+    }
+    void expectAgreement(const Pack& pack, const std::vector<std::array<float, 2>>& uvs, const Tolerance& tolerance) {
+        const auto model = static_cast<float>(pack.directionModel());
         const CpuRuntime cpu(pack);
         const Runtime gpu = valueOf(Runtime::create(device().context(), pack));
         constexpr std::array<std::array<float, 3>, 5> normals{
@@ -179,7 +188,7 @@ class SampleGlslTest : public test::GpuTest {
         for (float page : {0.0f, 1.0f})
             for (const auto& uv : uvs)
                 for (const auto& n : normals)
-                    queries.push_back({{uv[0], uv[1], page, pack.exposure()}, {n[0], n[1], n[2], 0}});
+                    queries.push_back({{uv[0], uv[1], page, pack.exposure()}, {n[0], n[1], n[2], model}});
         const auto results = Sampler(device().context(), gpu.images()).sample(queries);
         auto onCpu = [&](const std::array<float, 4>& uv, const std::array<float, 4>& n) {
             return sampleLightmap(pack, cpu.irradiancePages(), cpu.directionPages(), static_cast<uint32_t>(uv[2]),

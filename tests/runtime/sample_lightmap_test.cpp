@@ -55,6 +55,26 @@ TEST(SampleLightmap, FollowsTheHighlightModel) {
     }
 }
 
+TEST(SampleLightmap, TheLinearModelClampsTheSumAndNotTheHighlightAlone) {
+    PackData data = pageOf(1, 1).data();
+    data.direction_model = DirectionModel::Linear;
+    data.color_format = ColorFormat::E5B9G9R9;
+    const Pack pack = *Pack::fromData(std::move(data));
+    // As above; (8, 4, 2) with the exponent field of 8: 256 steps of 2^-5.
+    const uint32_t direction = 205u | (512u + 46u) << 10 | 512u << 20;
+    const uint32_t irradiance = 256u | 128u << 9 | 64u << 18 | 19u << 27;
+    const double r = 205.0 / 1023, b_x = 46 * 5.0 / 256;
+    for (double degrees = -90; degrees <= 90; degrees += 5) {
+        const double n_x = std::sin(degrees * M_PI / 180), n_z = std::cos(degrees * M_PI / 180);
+        const double expected = std::max(0.0, r + n_x * b_x + (1 - r) * n_z);
+        const auto e = sampleLightmap(pack, std::array{irradiance}, std::array{direction}, 0, {0.5f, 0.5f},
+                                      {static_cast<float>(n_x), 0, static_cast<float>(n_z)});
+        EXPECT_NEAR(e[0], 4 * expected, 1e-5);
+        EXPECT_NEAR(e[1], 2 * expected, 1e-5);
+        EXPECT_NEAR(e[2], 1 * expected, 1e-5);
+    }
+}
+
 TEST(SampleLightmap, InterpolatesBetweenTexelCentresAndClampsAtEdges) {
     const Pack pack = pageOf(4, 2);
     std::vector<uint32_t> irradiance, direction(8, no_direction);

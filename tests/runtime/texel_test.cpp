@@ -90,6 +90,58 @@ TEST(Ufloat, ACanonicalCodeHasNoInfinityNanOrDenormalAndIsOtherwiseAsItWas) {
     }
 }
 
+// From the definition of Vulkan's shared exponent format.
+std::array<double, 3> sharedExponentValue(uint32_t code) {
+    const int exponent = static_cast<int>(code >> 27) - 15 - 9;
+    return {std::ldexp(code & 0x1ff, exponent), std::ldexp(code >> 9 & 0x1ff, exponent),
+            std::ldexp(code >> 18 & 0x1ff, exponent)};
+}
+
+// The step of the smallest exponent that holds `largest` once it is rounded.
+double sharedStep(double largest) {
+    int exponent = 0;
+    while (exponent < 31 && std::floor(std::ldexp(largest, 24 - exponent) + 0.5) > 511) ++exponent;
+    return std::ldexp(1.0, exponent - 24);
+}
+
+TEST(SharedExponent, CodesDecodeByDefinitionAndComeBack) {
+    test::Random random(11);
+    for (int i = 0; i < 200000; ++i) {
+        const auto code = static_cast<uint32_t>(random());
+        const auto expected = sharedExponentValue(code);
+        const auto [r, g, b] = decodeE5B9G9R9(code);
+        ASSERT_EQ((std::array<double, 3>{r, g, b}), expected) << std::hex << code;
+        // Another code may stand for the same number, with a smaller exponent.
+        ASSERT_EQ(sharedExponentValue(encodeE5B9G9R9(r, g, b)), expected) << std::hex << code;
+    }
+}
+
+TEST(SharedExponent, RoundsEachChannelToTheNearestStepOfTheLargest) {
+    test::Random random(12);
+    for (int i = 0; i < 100000; ++i) {
+        const double top = std::pow(2.0, test::uniform(random, -26, 15.99f));
+        std::array<float, 3> v{};
+        for (float& c : v) c = static_cast<float>(top) * test::uniform(random, 0, 1);
+        // Near where the mantissa rounds up to the next exponent, too.
+        if (i % 3 == 0)
+            v[i % 2] = std::exp2(std::ceil(std::log2(static_cast<float>(top)))) * test::uniform(random, 0.996f, 1);
+        for (float& c : v) c = std::min(c, e5b9g9r9_largest);
+        const double step = sharedStep(static_cast<double>(std::max({v[0], v[1], v[2]})));
+        const auto stored = sharedExponentValue(encodeE5B9G9R9(v[0], v[1], v[2]));
+        // 1e-6 of 512 steps: the float that the half is added to.
+        for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(stored[c], static_cast<double>(v[c]), step * 0.5001) << v[0] << " " << v[1] << " " << v[2];
+    }
+}
+
+TEST(SharedExponent, WhatIsNoLightBecomesBlackAndTooMuchBecomesTheLargest) {
+    const float infinity = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+    for (float dark : {0.0f, -0.0f, -1.0f, -infinity, nan, -nan, 1e-30f, std::numeric_limits<float>::denorm_min()})
+        EXPECT_EQ(sharedExponentValue(encodeE5B9G9R9(dark, dark, dark)), (std::array<double, 3>{})) << dark;
+    for (float bright : {65408.0f, 65536.0f, 1e30f, std::numeric_limits<float>::max(), infinity})
+        EXPECT_EQ(sharedExponentValue(encodeE5B9G9R9(0, bright, nan)), (std::array<double, 3>{0, 65408, 0})) << bright;
+}
+
 // In double, from the definition.
 struct Direction {
     double r, bx, by;
@@ -124,13 +176,18 @@ TEST(Direction, EveryLobeComesBackWithinHalfAStep) {
     EXPECT_EQ(encodeDirection(1, 1, 0, 0), direction_none);
 }
 
+constexpr float lift = weightScale(ColorFormat::R11G11B10F);
+
+std::array<double, 3> r11g11b10Value(uint32_t code) {
+    return {ufloatValue(code & 0x7ff, 6), ufloatValue(code >> 11 & 0x7ff, 6), ufloatValue(code >> 22, 5)};
+}
+
 struct Sum {
     double e[3] = {}, l = 0, ambient = 0, bx = 0, by = 0;
 
-    void add(TexelRecord record, Weight w) {
-        const double c[3] = {w.r * ufloatValue(record.irradiance & 0x7ff, 6),
-                             w.g * ufloatValue(record.irradiance >> 11 & 0x7ff, 6),
-                             w.b * ufloatValue(record.irradiance >> 22, 5)};
+    void add(TexelRecord record, Weight w) { add(r11g11b10Value(record.irradiance), record, w); }
+    void add(const std::array<double, 3>& value, TexelRecord record, Weight w) {
+        const double c[3] = {w.r * value[0], w.g * value[1], w.b * value[2]};
         const double cl = 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
         const Direction d = directionOf(record.direction);
         for (int i = 0; i < 3; ++i) e[i] += c[i];
@@ -160,7 +217,7 @@ TEST(TexelBlend, IsWithinHalfAQuantumOfTheSumInDouble) {
             const TexelRecord record = test::randomRecord(random, 1.0f / 64);
             const float scalar = test::uniform(random, 0, 2);
             const Weight w = round % 2 ? Weight(scalar) : Weight(scalar, test::uniform(random, 0, 2), 0);
-            blend.add(record, w.r * weight_scale, w.g * weight_scale, w.b * weight_scale);
+            blend.add(record, w.r * lift, w.g * lift, w.b * lift);
             exact.add(record, w);
         }
         const TexelRecord result = blend.encode();
@@ -177,13 +234,40 @@ TEST(TexelBlend, IsWithinHalfAQuantumOfTheSumInDouble) {
     }
 }
 
+TEST(TexelBlend, OfSharedExponentsIsWithinHalfAQuantumOfTheSumInDouble) {
+    constexpr float scale = weightScale(ColorFormat::E5B9G9R9);
+    test::Random random(13);
+    for (int round = 0; round < 20000; ++round) {
+        TexelBlend<ColorFormat::E5B9G9R9> blend;
+        Sum exact;
+        for (uint32_t terms = test::pick(random, 1, 13); terms > 0; --terms) {
+            const TexelRecord record{test::randomSharedExponent(random), test::randomDirection(random)};
+            const float scalar = test::uniform(random, 0, 2);
+            const Weight w = round % 2 ? Weight(scalar) : Weight(scalar, test::uniform(random, 0, 2), 0);
+            blend.add(record, w.r * scale, w.g * scale, w.b * scale);
+            exact.add(sharedExponentValue(record.irradiance), record, w);
+        }
+        const TexelRecord result = blend.encode();
+        const double largest = std::max({exact.e[0], exact.e[1], exact.e[2]});
+        const auto stored = sharedExponentValue(result.irradiance);
+        // Half a step, and what 13 additions in 32-bit floats may lose: 2e-6 of 512 steps.
+        for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(stored[c], exact.e[c], sharedStep(largest) * 0.502) << "round " << round;
+        if (exact.l < 1e-5) continue;  // black: no direction to compare
+        EXPECT_NEAR(result.direction & 0x3ff, exact.ambient / exact.l * 1023, 0.52);
+        EXPECT_NEAR(result.direction >> 10 & 0x3ff, 512 + exact.bx / exact.l * 256 / 5, 0.52);
+        EXPECT_NEAR(result.direction >> 20 & 0x3ff, 512 + exact.by / exact.l * 256 / 5, 0.52);
+        if (HasFailure()) FAIL() << "in round " << round;
+    }
+}
+
 TEST(TexelBlend, OneRecordAtFullWeightKeepsItsIrradianceAndItsDirection) {
     test::Random random(5);
     for (int i = 0; i < 50000; ++i) {
         const uint32_t light = test::randomIrradiance(random, 1.0f / 64);
         const TexelRecord record{light == 0 ? 64u : light, test::randomDirection(random)};
         TexelBlend blend;
-        blend.add(record, weight_scale, weight_scale, weight_scale);
+        blend.add(record, lift, lift, lift);
         ASSERT_EQ(blend.encode(), record) << std::hex << record.irradiance << " " << record.direction;
     }
 }
@@ -192,11 +276,15 @@ TEST(TexelBlend, HostileRecordsAndWeightsGiveCanonicalCodes) {
     test::Random random(6);
     for (int round = 0; round < 100000; ++round) {
         TexelBlend blend;
+        TexelBlend<ColorFormat::E5B9G9R9> shared;
         for (uint32_t terms = test::pick(random, 1, 40); terms > 0; --terms) {
             // Up to planned_weight_max, and down to where the product with the scale is a denormal number.
             const float w = std::exp2(test::uniform(random, -149, 127));
-            blend.add({static_cast<uint32_t>(random()), static_cast<uint32_t>(random())}, w, w, w);
+            const TexelRecord record{static_cast<uint32_t>(random()), static_cast<uint32_t>(random())};
+            blend.add(record, w, w, w);
+            shared.add(record, w, w, w);
         }
+        ASSERT_EQ(shared.encode().direction >> 30, 0u);
         const TexelRecord result = blend.encode();
         ASSERT_EQ(canonicalR11G11B10(result.irradiance), result.irradiance);
         ASSERT_EQ(result.direction >> 30, 0u);

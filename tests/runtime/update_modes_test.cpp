@@ -21,6 +21,7 @@ class UpdateModes : public test::GpuTest, public testing::WithParamInterface<Upd
         ASSERT_TRUE(std::ranges::equal(pages->irradiance, cpu.irradiancePages()));
         ASSERT_TRUE(std::ranges::equal(pages->direction, cpu.directionPages()));
     }
+    static void followARandomHistory(ColorFormat format);
     static Pack packOf(PackData data) {
         auto pack = Pack::fromData(std::move(data));
         if (!pack) throw std::runtime_error(pack.error().message);
@@ -28,10 +29,10 @@ class UpdateModes : public test::GpuTest, public testing::WithParamInterface<Upd
     }
 };
 
-TEST_P(UpdateModes, GpuPagesAreThoseOfTheCpuOverRandomHistories) {
+void UpdateModes::followARandomHistory(ColorFormat format) {
     // Overlaps up to 20: every kernel, the loop included; clusters of odd sizes.
-    const Pack pack =
-        packOf(test::randomPack(20, {.sets = 18, .doors = 2, .clusters = 60, .overlap_max = 20, .page_side = 80}));
+    const Pack pack = packOf(test::randomPack(
+        20, {.sets = 18, .doors = 2, .clusters = 60, .overlap_max = 20, .page_side = 80, .color_format = format}));
     Runtime gpu = runtimeOf(pack);
     CpuRuntime cpu(pack);
     test::Random random(20);
@@ -46,6 +47,14 @@ TEST_P(UpdateModes, GpuPagesAreThoseOfTheCpuOverRandomHistories) {
         const std::string state = test::randomState(pack.data(), random);
         ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
     }
+}
+
+TEST_P(UpdateModes, GpuPagesAreThoseOfTheCpuOverRandomHistories) {
+    followARandomHistory(ColorFormat::R11G11B10F);
+}
+
+TEST_P(UpdateModes, GpuPagesOfSharedExponentsAreThoseOfTheCpu) {
+    followARandomHistory(ColorFormat::E5B9G9R9);
 }
 
 TEST_P(UpdateModes, GpuPagesHoldTheBaseAgainWhenAllIsOff) {

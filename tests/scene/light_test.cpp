@@ -72,23 +72,13 @@ TEST(SceneLights, BadLightsAreRefused) {
     }
 }
 
-TEST(SceneLights, IesProfilesAreIgnoredAndSaidSo) {
-    LevelFile level = LevelFile::withFloor();
-    level.addLight("lamp", {{"type", "point"}});
-    level.node(1)["extensions"]["EXT_lights_ies"] = {{"profile", 0}};
-    const auto scene = level.import();
-    ASSERT_IMPORTED(scene);
-    expectWarning(*scene, {"node 'lamp'", "EXT_lights_ies"});
-}
-
 TEST(SceneLights, Sky) {
     LevelFile level = LevelFile::withFloor();
     json& extras = level.document["scenes"][0]["extras"];
-    extras = {{"dimmer_sky_color", {0.6, 0.75, 1}}, {"dimmer_sky_luminance", 600}, {"dimmer_sky_image", "sky.hdr"}};
+    extras = {{"dimmer_sky_color", {0.6, 0.75, 1}}, {"dimmer_sky_luminance", 600}};
     auto scene = level.import();
     ASSERT_IMPORTED(scene);
     expectNear(scene->sky_radiance_cd_m2, {360, 450, 600}, 1e-3f);
-    expectWarning(*scene, {"dimmer_sky_image", "ignored"});
 
     extras = {{"dimmer_sky_color", {0.6, 0.75, 1}}};
     scene = level.import();

@@ -17,7 +17,7 @@ class CpuRuntime : public LightState {
     // Blends what changed since the last call into the pages. Nothing changed: returns at once. Not thread-safe.
     UpdateStats update();
 
-    // The lightmap pages, one after another, rows from the top; in the sampled formats: B10G11R11_UFLOAT_PACK32 and
+    // The lightmap pages, one after another, rows from the top; in the sampled formats: Pack::colorFormat() and
     // A2B10G10R10_UNORM_PACK32.
     std::span<const uint32_t> irradiancePages() const { return irradiance_; }
     std::span<const uint32_t> directionPages() const { return direction_; }

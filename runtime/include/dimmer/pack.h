@@ -37,6 +37,15 @@ struct Contribution {
     float energy_dropped = 0;            // share of its energy, 0..1, that fell below the activity threshold
 };
 
+// What 4 bytes of a lightmap texel's irradiance hold; both are sampled and filtered by the device.
+enum class ColorFormat : uint32_t {
+    R11G11B10F = 0,  // B10G11R11_UFLOAT_PACK32: steps of up to 1.6 %, blue 3.1 %, of each channel
+    E5B9G9R9 = 1,    // E5B9G9R9_UFLOAT_PACK32: steps of up to 0.4 % of the largest channel
+};
+
+// How irradiance falls off for normals other than the surface's own; see runtime/format/texel.h.
+enum class DirectionModel : uint32_t { Ahd = 0, Linear = 1 };
+
 struct MeshVertex {
     std::array<float, 3> position_m;   // world space, metres, +Y up
     std::array<float, 3> normal;       // unit, world space
@@ -79,6 +88,8 @@ class Pack {
     uint32_t pageCount() const;
     uint32_t pageWidth() const;
     uint32_t pageHeight() const;
+    ColorFormat colorFormat() const;
+    DirectionModel directionModel() const;
     // Stored value = physical value * exposure; a power of two.
     float exposure() const;
 

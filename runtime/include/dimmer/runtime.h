@@ -54,7 +54,7 @@ struct RuntimeOptions {
 
 // The lightmap as a shader samples it: 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates.
 struct LightmapImages {
-    VkImage irradiance = VK_NULL_HANDLE;           // B10G11R11_UFLOAT_PACK32; lux * exposure
+    VkImage irradiance = VK_NULL_HANDLE;           // in the pack's ColorFormat; lux * exposure
     VkImageView irradiance_view = VK_NULL_HANDLE;  // VK_IMAGE_VIEW_TYPE_2D_ARRAY
     VkImage direction = VK_NULL_HANDLE;            // A2B10G10R10_UNORM_PACK32; see sample.glsl
     VkImageView direction_view = VK_NULL_HANDLE;

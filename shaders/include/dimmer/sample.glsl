@@ -5,7 +5,7 @@
 //     ...
 //     mat3 world_from_tangent = dimmer_world_from_tangent(position, normal, lightmap_uv);
 //     vec3 e_lux = dimmer_lightmap_irradiance(irradiance_pages, direction_pages, vec3(lightmap_uv, page),
-//                                             shading_normal * world_from_tangent, exposure);
+//                                             shading_normal * world_from_tangent, exposure, model);
 //     vec3 radiance_cd_m2 = albedo / pi * e_lux;
 //
 // Both with LightmapImages::sampler (bilinear, clamp to edge).
@@ -14,17 +14,22 @@
 
 #include "dimmer/texel.glsl"
 
+const uint dimmer_model_ahd = 0u;
+const uint dimmer_model_linear = 1u;
+
 // Irradiance in lux, linear Rec.709.
 //   uv_page         lightmap UV, 0..1 over the page, and the page
 //   normal_tangent  unit normal in the texel's tangent frame; (0,0,1) is the surface's own
 //   exposure        Pack::exposure(): stored value = physical value * exposure
+//   model           Pack::directionModel(): best a constant or a specialisation constant
 vec3 dimmer_lightmap_irradiance(sampler2DArray irradiance, sampler2DArray direction, vec3 uv_page, vec3 normal_tangent,
-                                float exposure) {
+                                float exposure, uint model) {
     vec3 e_z = texture(irradiance, uv_page).rgb;
     vec3 h = dimmer_highlight_from_unorm(texture(direction, uv_page).rgb);
-    // E(n) = E_z (r + max(0, b.n_xy + (1-r) n_z)); see runtime/format/texel.h.
+    // E(n) = E_z (r + max(0, b.n_xy + (1-r) n_z)), or "linear" E_z max(0, r + ...); see runtime/format/texel.h.
     float highlight = dot(h.yz, normal_tangent.xy) + (1.0 - h.x) * normal_tangent.z;
-    return e_z * ((h.x + max(highlight, 0.0)) / exposure);
+    float falloff = model == dimmer_model_ahd ? h.x + max(highlight, 0.0) : max(h.x + highlight, 0.0);
+    return e_z * (falloff / exposure);
 }
 
 // The tangent frame of the lightmap, columns t, b, n. n is `normal`, the mesh's own unit normal; t lies in the surface

@@ -5,7 +5,8 @@
 
 const float dimmer_moment_step = 5.0 / 256.0;
 const uint dimmer_direction_none = 1023u | 512u << 10 | 512u << 20;
-const float dimmer_weight_scale = 1267650600228229401496703205376.0;  // 2^100
+const uint dimmer_r11g11b10f = 0u;  // ColorFormat
+const uint dimmer_e5b9g9r9 = 1u;
 const int dimmer_blend_exponent = 12;
 const float dimmer_blend_luminance_min = 2.3283064365386962890625e-10;  // 2^-32
 const float dimmer_blend_luminance_max = 268435456.0;                   // 2^28
@@ -13,6 +14,11 @@ const float dimmer_blend_luminance_max = 268435456.0;                   // 2^28
 float dimmer_luminance(float r, float g, float b) {
     precise float l = 0.2126 * r + 0.7152 * g + 0.0722 * b;
     return l;
+}
+
+// What weights carry; `format` is a ColorFormat, here and below: a constant, as a specialisation constant is.
+float dimmer_weight_scale(uint format) {
+    return format == dimmer_r11g11b10f ? 1267650600228229401496703205376.0 : 0.000244140625;  // 2^100, 2^-12
 }
 
 // `value` is not negative and no NaN.
@@ -23,6 +29,25 @@ uint dimmer_encode_ufloat(float value, int mantissa_bits, int exponent) {
     uint bits = floatBitsToUint(value);
     uint rounded = (bits + ((1u << (shift - 1)) - 1u) + (bits >> shift & 1u)) >> shift;
     return rounded < bias + (1u << mantissa_bits) ? 0u : min(rounded - bias, largest);
+}
+
+// `value` is not negative and no NaN.
+uint dimmer_encode_e5b9g9r9(vec3 value, int exponent) {
+    vec3 clamped = min(value, vec3(uintBitsToFloat(0x477f8000u - (uint(exponent) << 23))));  // 65408
+    uint bits = floatBitsToUint(max(clamped.r, max(clamped.g, clamped.b))) + (1u << 14);
+    uint lowest = uint(111 - exponent);
+    uint field = max(bits >> 23, lowest);
+    precise vec3 steps = clamped * uintBitsToFloat((262u - field) << 23) + 0.5;
+    uvec3 codes = uvec3(ivec3(steps));
+    return codes.r | codes.g << 9 | codes.b << 18 | (field - lowest) << 27;
+}
+
+// A record's channels as weights meet them: their bits in a float's exponent, or their values.
+vec3 dimmer_lift(uint code, uint format) {
+    if (format == dimmer_r11g11b10f)
+        return uintBitsToFloat(uvec3((code & 0x7ffu) << 17, code << 6 & 0xffe0000u, code >> 4 & 0xffc0000u));
+    float exponent_step = uintBitsToFloat(((code >> 27) + 103u) << 23);
+    return vec3(ivec3(code & 0x1ffu, code >> 9 & 0x1ffu, code >> 18 & 0x1ffu)) * exponent_step;
 }
 
 // x: the ambient share; yz: the highlight's moment b = (1-r) d_xy / d_z. `codes`: as a sampler returns them.
@@ -38,9 +63,8 @@ struct DimmerTexelBlend {
 };
 
 // `weight` carries dimmer_weight_scale.
-void dimmer_blend_add(inout DimmerTexelBlend sum, uint irradiance, uint direction, vec3 weight) {
-    precise vec3 e = weight * uintBitsToFloat(uvec3((irradiance & 0x7ffu) << 17, irradiance << 6 & 0xffe0000u,
-                                                    irradiance >> 4 & 0xffc0000u));
+void dimmer_blend_add(inout DimmerTexelBlend sum, uint irradiance, uint direction, vec3 weight, uint format) {
+    precise vec3 e = weight * dimmer_lift(irradiance, format);
     precise float l = dimmer_luminance(e.r, e.g, e.b);
     precise vec3 codes = l * vec3(ivec3(direction & 0x3ffu, direction & 0xffc00u, direction & 0x3ff00000u));
     precise vec3 irradiance_sum = sum.irradiance + e;
@@ -49,10 +73,12 @@ void dimmer_blend_add(inout DimmerTexelBlend sum, uint irradiance, uint directio
     sum = DimmerTexelBlend(irradiance_sum, l_sum, direction_sum);
 }
 
-uvec2 dimmer_blend_encode(DimmerTexelBlend sum) {
-    uint irradiance = dimmer_encode_ufloat(sum.irradiance.r, 6, dimmer_blend_exponent) |
-                      dimmer_encode_ufloat(sum.irradiance.g, 6, dimmer_blend_exponent) << 11 |
-                      dimmer_encode_ufloat(sum.irradiance.b, 5, dimmer_blend_exponent) << 22;
+uvec2 dimmer_blend_encode(DimmerTexelBlend sum, uint format) {
+    uint irradiance = format == dimmer_r11g11b10f
+                          ? dimmer_encode_ufloat(sum.irradiance.r, 6, dimmer_blend_exponent) |
+                                dimmer_encode_ufloat(sum.irradiance.g, 6, dimmer_blend_exponent) << 11 |
+                                dimmer_encode_ufloat(sum.irradiance.b, 5, dimmer_blend_exponent) << 22
+                          : dimmer_encode_e5b9g9r9(sum.irradiance, dimmer_blend_exponent);
     // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
     bool usable = sum.l >= dimmer_blend_luminance_min && sum.l <= dimmer_blend_luminance_max;
     precise float inverse = 1.0 / (usable ? sum.l : 1.0);

@@ -22,7 +22,7 @@ struct WorkItem {
 // A contribution of a cluster that is on.
 struct WorkTerm {
     DIMMER_UINT term;                    // of the pack; on the device: the cluster's first record of it
-    float weight_r, weight_g, weight_b;  // times weight_scale of texel.h
+    float weight_r, weight_g, weight_b;  // times weightScale() of texel.h
 };
 
 // Where the device keeps a batch.

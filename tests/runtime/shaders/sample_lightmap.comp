@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 
 struct Query {
     vec4 uv_page;         // w: exposure
-    vec4 normal_tangent;  // xyz
+    vec4 normal_tangent;  // w: directional model
 };
 
 layout(set = 0, binding = 0) uniform sampler2DArray irradiance_pages;
@@ -21,6 +21,7 @@ void main() {
     if (i >= queries.length()) return;
     Query query = queries[i];
     irradiance_lux[i] = vec4(dimmer_lightmap_irradiance(irradiance_pages, direction_pages, query.uv_page.xyz,
-                                                        query.normal_tangent.xyz, query.uv_page.w),
+                                                        query.normal_tangent.xyz, query.uv_page.w,
+                                                        uint(query.normal_tangent.w)),
                              0);
 }

@@ -1,0 +1,35 @@
+#include <app/interrupt.h>
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <thread>
+
+namespace dimmer::cook {
+
+void endCleanlyOnInterrupt() {
+    sigset_t signals;
+    sigemptyset(&signals);
+    bool any = false;
+    for (const int signal : {SIGINT, SIGTERM}) {
+        struct sigaction action {};
+        if (sigaction(signal, nullptr, &action) != 0 || action.sa_handler == SIG_IGN) continue;
+        sigaddset(&signals, signal);
+        any = true;
+    }
+    if (!any || pthread_sigmask(SIG_BLOCK, &signals, nullptr) != 0) return;
+    // A thread may do what a signal handler must not: wait for a lock, and print.
+    std::thread([signals] {
+        int signal = 0;
+        if (sigwait(&signals, &signal) != 0) return;
+        fileReplacement().lock();
+        // A terminal's cursor stands behind the progress bar.
+        fmt::print(stderr, "{}dimmer: interrupted\n", isatty(STDERR_FILENO) == 1 ? "\r\x1b[K" : "");
+        _exit(128 + signal);
+    }).detach();
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,118 @@
+#include <bake/light_grid.h>
+
+#include <bake/sampling.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float cell_min_m = 2;
+constexpr float cells_per_axis_max = 48;
+// Rays are followed in steps of this share of a cell: short enough not to cut more than corners.
+constexpr float step_share = 0.5f;
+// Lights further outside of the level are no lamps of its: their rays would miss it.
+constexpr float margin_m = 20;
+
+// The light's place and direction, not its intensity: a dimmed lamp keeps its noise.
+uint32_t identityOf(const PunctualLight& light) {
+    uint32_t id = static_cast<uint32_t>(light.type);
+    for (const glm::vec3 v : {light.position_m, light.direction})
+        for (int c = 0; c < 3; ++c) id = hash(id, std::bit_cast<uint32_t>(v[c]));
+    return id;
+}
+
+// Direction i of n, evenly over the cap of directions within `cos_least` of the axis (a spherical Fibonacci set).
+glm::vec3 capDirection(uint32_t i, uint32_t n, float cos_least, glm::vec3 axis) {
+    constexpr float golden_angle = 2.39996323f;
+    const float z = 1 - (1 - cos_least) * (static_cast<float>(i) + 0.5f) / static_cast<float>(n);
+    const float across = std::sqrt(std::max(0.0f, 1 - z * z)), phi = golden_angle * static_cast<float>(i);
+    glm::vec3 t, b;
+    orthonormalBasis(axis, t, b);
+    return t * (across * std::cos(phi)) + b * (across * std::sin(phi)) + axis * z;
+}
+
+}  // namespace
+
+LightGrid::LightGrid(const RayScene& rays, bool enabled) {
+    const auto isFarOutside = [&](glm::vec3 p) {
+        return glm::distance(p, glm::clamp(p, rays.boundsMin(), rays.boundsMax())) > margin_m;
+    };
+    const auto& lights = rays.scene().lights;
+    std::vector<uint32_t> sought;
+    for (uint32_t l = 0; l < lights.size(); ++l) {
+        const PunctualLight& light = lights[l];
+        identity_.push_back(identityOf(light));
+        if (light.bake == BakeMode::None) continue;
+        const bool unlisted = !enabled || light.type == LightType::Directional || light.bake == BakeMode::Full ||
+                              isFarOutside(light.position_m);
+        (unlisted ? everywhere_ : sought).push_back(l);
+    }
+    if (sought.empty()) return;
+    const glm::vec3 extent = rays.boundsMax() - rays.boundsMin();
+    cell_m_ = std::max(cell_min_m, std::max(extent.x, std::max(extent.y, extent.z)) / cells_per_axis_max);
+    origin_ = rays.boundsMin();
+    size_ = glm::uvec3(glm::floor(extent / cell_m_)) + 1u;
+
+    std::vector<std::vector<uint32_t>> reached(sought.size());
+    tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, sought[i]); });
+    first_.assign(cellCount() + 1, 0);
+    for (const auto& cells : reached)
+        for (const uint32_t cell : cells) ++first_[cell + 1];
+    for (size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
+    lights_.resize(first_.back());
+    std::vector<uint64_t> end(first_.begin(), first_.end() - 1);
+    for (size_t i = 0; i < reached.size(); ++i)
+        for (const uint32_t cell : reached[i]) lights_[end[cell]++] = sought[i];
+}
+
+std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t index) const {
+    const PunctualLight& light = rays.scene().lights[index];
+    const float cos_least = light.type == LightType::Spot ? light.cone_outer_cos : -1;
+    const float far_m = light.range_m.value_or(glm::length(rays.boundsMax() - rays.boundsMin()) + 2 * margin_m);
+    // The way to the neighbouring rays, per metre: no direction is further from its nearest ray, so that in the open
+    // nothing is missed however far.
+    const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));
+    std::vector<uint8_t> marks(cellCount());
+    for (uint32_t i = 0; i < light_probe_rays; ++i) {
+        const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
+        const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i));
+        const float stop_m = hit ? hit->distance_m : far_m;
+        for (float m = 0; m < stop_m; m += step_share * cell_m_)
+            markAround(light.position_m + d * m, spread * m, marks);
+        // Surfaces receive, and theirs is the light: generously around what a ray hit.
+        markAround(light.position_m + d * stop_m, std::max(0.5f * cell_m_, spread * stop_m), marks);
+    }
+    std::vector<uint32_t> cells;
+    for (uint32_t c = 0; c < marks.size(); ++c)
+        if (marks[c]) cells.push_back(c);
+    return cells;
+}
+
+void LightGrid::markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const {
+    const glm::uvec3 low = coordinates(point - reach_m), high = coordinates(point + reach_m);
+    for (uint32_t z = low.z; z <= high.z; ++z)
+        for (uint32_t y = low.y; y <= high.y; ++y)
+            for (uint32_t x = low.x; x <= high.x; ++x) marks[(z * size_.y + y) * size_.x + x] = 1;
+}
+
+glm::uvec3 LightGrid::coordinates(glm::vec3 point) const {
+    return glm::clamp((point - origin_) / cell_m_, glm::vec3(0), glm::vec3(size_) - 0.5f);
+}
+
+uint32_t LightGrid::cellAt(glm::vec3 point) const {
+    const glm::uvec3 c = coordinates(point);
+    return (c.z * size_.y + c.y) * size_.x + c.x;
+}
+
+std::span<const uint32_t> LightGrid::listed(glm::vec3 point) const {
+    if (first_.empty()) return {};
+    const uint32_t cell = cellAt(point);
+    return {lights_.data() + first_[cell], first_[cell + 1] - first_[cell]};
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,52 @@
+// Which punctual lights are worth a shadow ray from where.
+#pragma once
+
+#include <trace/ray_scene.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+// Rays that each light sends out to find the cells that it reaches, evenly over the directions that it shines into: for
+// a point light 0.055 rad apart. Lost is what shines through openings between them, a 500,000th of lq_e2m3's light
+// (docs/decisions.md).
+inline constexpr uint32_t light_probe_rays = 4096;
+
+// A grid over the level; its cells list the lights that reach them, found by rays from the lights. Asked for
+// everywhere: lights baked in full (BakeMode::Full), since what they light is seen itself, directional ones, and those
+// far outside of the level, whose rays would miss it. What is said of a light depends on no other light.
+class LightGrid {
+   public:
+    // Disabled, every light reaches everything.
+    explicit LightGrid(const RayScene& rays, bool enabled = true);
+
+    // visit(light) for those whose light may be found at `point`; always in the same order.
+    void forEach(glm::vec3 point, auto&& visit) const {
+        for (const uint32_t light : everywhere_) visit(light);
+        for (const uint32_t light : listed(point)) visit(light);
+    }
+    // The lights whose rays came by the cell of a point, ascending.
+    std::span<const uint32_t> listed(glm::vec3 point) const;
+    // A number of the light's own, which other lights do not change.
+    uint32_t identity(uint32_t light) const { return identity_[light]; }
+
+   private:
+    size_t cellCount() const { return size_t{size_.x} * size_.y * size_.z; }
+    uint32_t cellAt(glm::vec3 point) const;
+    glm::uvec3 coordinates(glm::vec3 point) const;
+    std::vector<uint32_t> reachedCells(const RayScene& rays, uint32_t light) const;
+    void markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const;
+
+    std::vector<uint32_t> identity_;  // per light
+    std::vector<uint32_t> everywhere_;
+    glm::vec3 origin_{0};
+    float cell_m_ = 1;
+    glm::uvec3 size_{0};
+    std::vector<uint64_t> first_;  // per cell and one more, into lights_; empty: no light is listed anywhere
+    std::vector<uint32_t> lights_;
+};
+
+}  // namespace dimmer::cook

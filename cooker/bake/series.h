@@ -1,0 +1,33 @@
+// The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
+// receivers traced once and followed bounce after bounce. What it leaves is the light that the final gather reads.
+#pragma once
+
+#include <bake/bake.h>
+
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct Series {
+    SparseLight direct;                   // irradiance from punctual lights, emitters and the sky, lux
+    SparseLight bounced;                  // irradiance after one bounce or more, lux
+    SparseLight left_to_renderer;         // the part of `direct` that renderers draw themselves and no pack stores
+    Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
+    SparseLight radiance;                 // what leaves each receiver, cd/m2
+    std::vector<GroupReport> groups;
+    uint32_t bounces = 0;
+    uint64_t rays = 0;
+    std::vector<std::string> warnings;
+
+    // Lit directly counts once it matters as much as the threshold asks of indirect light: a lamp without range lights
+    // everything in sight a little.
+    bool active(uint32_t group, float direct_lux, float bounced_lux) const;
+    // Ascending: always-on light, then the sets that are active at the receiver.
+    void activeGroups(size_t receiver, std::vector<uint32_t>& groups) const;
+};
+
+// Deterministic for any number of threads. Memory while it runs: 4 bytes * series_rays per texel.
+Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress);
+
+}  // namespace dimmer::cook

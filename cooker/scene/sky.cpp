@@ -1,0 +1,162 @@
+#include <scene/sky.h>
+
+#include <scene/gltf_file.h>
+#include <scene/radiance_image.h>
+
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+
+namespace dimmer::cook {
+namespace {
+
+// 8192 x 4096: a sky of that size is half a gibibyte in memory, and finer than any bake can tell.
+constexpr uint64_t texels_max = uint64_t{1} << 25;
+
+constexpr int exr_side_max = 65536;
+
+std::unexpected<Error> refuse(const std::string& file, std::string_view what) {
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", file, what));
+}
+
+Expected<Image> sized(int64_t width, int64_t height, const std::string& file) {
+    if (width < 1 || height < 1 || static_cast<uint64_t>(width) > texels_max ||
+        static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > texels_max)
+        return refuse(file, fmt::format("has {} x {} texels. Scale it to 8192 x 4096 or less.", width, height));
+    Image image{static_cast<uint32_t>(width), static_cast<uint32_t>(height), {}};
+    image.texels.resize(size_t{image.width} * image.height, glm::vec4(0, 0, 0, 1));
+    return image;
+}
+
+Expected<Image> decodeRadiance(std::span<const unsigned char> bytes, const std::string& file) {
+    const auto header = readRadianceHeader(bytes);
+    if (!header) return refuse(file, header.error());
+    auto image = sized(header->width, header->height, file);
+    if (image && !readRadianceTexels(bytes, *header, image->texels))
+        return refuse(file, "is a damaged or truncated Radiance picture. Save or copy it again.");
+    return image;
+}
+
+// OpenEXR reads from streams of its own kind.
+class MemoryStream : public Imf::IStream {
+   public:
+    MemoryStream(std::span<const unsigned char> bytes, const std::string& file)
+        : Imf::IStream(file.c_str()), bytes_(bytes) {}
+    bool read(char to[], int count) override {
+        if (count < 0 || static_cast<size_t>(count) > bytes_.size() - at_)
+            throw std::runtime_error("the file ends too early");
+        std::memcpy(to, bytes_.data() + at_, static_cast<size_t>(count));
+        at_ += static_cast<size_t>(count);
+        return at_ < bytes_.size();
+    }
+    uint64_t tellg() override { return at_; }
+    void seekg(uint64_t position) override { at_ = std::min<uint64_t>(position, bytes_.size()); }
+
+   private:
+    std::span<const unsigned char> bytes_;
+    size_t at_ = 0;
+};
+
+Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::string& file) {
+    try {
+        // A hostile header must not make the library reserve a table of four billion rows.
+        Imf::Header::setMaxImageSize(exr_side_max, exr_side_max);
+        MemoryStream stream(bytes, file);
+        Imf::InputFile input(stream, 0);
+        const Imath::Box2i window = input.header().dataWindow();
+        for (const char* name : {"R", "G", "B"})
+            if (!input.header().channels().findChannel(name))
+                return refuse(file, "has no channels R, G and B. Save it as a plain RGB image.");
+        auto image = sized(int64_t{window.max.x} - window.min.x + 1, int64_t{window.max.y} - window.min.y + 1, file);
+        if (!image) return image;
+        // A slice's base is where texel (0, 0) would lie, which the window need not hold: unsigned arithmetic wraps.
+        const size_t row_bytes = image->width * sizeof(glm::vec4);
+        const auto first = reinterpret_cast<uintptr_t>(image->texels.data());
+        const uintptr_t origin = first - static_cast<uintptr_t>(int64_t{window.min.x}) * sizeof(glm::vec4) -
+                                 static_cast<uintptr_t>(int64_t{window.min.y}) * row_bytes;
+        Imf::FrameBuffer frame;
+        for (size_t c = 0; const char* name : {"R", "G", "B"})
+            frame.insert(name, Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(origin + sizeof(float) * c++),
+                                          sizeof(glm::vec4), row_bytes));
+        input.setFrameBuffer(frame);
+        input.readPixels(window.min.y, window.max.y);
+        return image;
+    } catch (const std::bad_alloc&) {
+        throw;  // importLevel says what that means
+    } catch (const std::exception& problem) {
+        return refuse(file, fmt::format("is a damaged OpenEXR image ({}). Save it again.", problem.what()));
+    }
+}
+
+Expected<void> clean(Image& image, const std::string& file) {
+    for (glm::vec4& texel : image.texels)
+        for (int c = 0; c < 3; ++c) {
+            if (!isFiniteFloat(static_cast<double>(texel[c])))
+                return refuse(file, "holds NaN or infinite values. Clamp them and save it again.");
+            texel[c] = std::max(texel[c], 0.0f);  // resampling filters leave small negative lobes
+        }
+    return {};
+}
+
+float largest(const Image& image) {
+    float most = 0;
+    for (const glm::vec4& t : image.texels) most = std::max(most, std::max(t.x, std::max(t.y, t.z)));
+    return most;
+}
+
+}  // namespace
+
+Expected<Image> readSkyImage(const std::filesystem::path& path) {
+    const std::string file = path.string();
+    const auto bytes = readFile(path);
+    if (!bytes) return std::unexpected(bytes.error());
+    const auto startsWith = [&](std::string_view magic) {
+        return bytes->size() >= magic.size() && std::memcmp(bytes->data(), magic.data(), magic.size()) == 0;
+    };
+    const bool radiance = startsWith("#?"), openexr = startsWith("\x76\x2f\x31\x01");
+    if (!radiance && !openexr) return refuse(file, "is neither Radiance (.hdr) nor OpenEXR (.exr). Convert it.");
+    auto image = radiance ? decodeRadiance(*bytes, file) : decodeOpenExr(*bytes, file);
+    if (!image) return image;
+    if (const auto ok = clean(*image, file); !ok) return std::unexpected(ok.error());
+    return image;
+}
+
+Expected<void> importSky(ImportContext& context, const Extras& extras) {
+    Scene& scene = context.scene;
+    const auto color = extras.numbers("dimmer_sky_color", 3);
+    if (!color) return std::unexpected(color.error());
+    const auto luminance = extras.number("dimmer_sky_luminance");
+    if (!luminance) return std::unexpected(luminance.error());
+    const auto name = extras.text("dimmer_sky_image");
+    if (!name) return std::unexpected(name.error());
+    if (!*name && color->has_value() != luminance->has_value()) {
+        context.warn("scene", "the sky needs both 'dimmer_sky_color' and 'dimmer_sky_luminance'; it stays black.");
+        return {};
+    }
+    if (!*name && !*color) return {};
+    glm::dvec3 c(1);
+    if (*color) c = {(**color)[0], (**color)[1], (**color)[2]};
+    const double cd_m2 = luminance->value_or(1);
+    double brightest = 1;
+    if (*name) {
+        auto image = readSkyImage(std::filesystem::path(scene.file).parent_path() / **name);
+        if (!image) return context.error("scene", "'dimmer_sky_image': " + image.error().message);
+        brightest = static_cast<double>(largest(*image));
+        scene.sky_image = std::make_shared<const Image>(std::move(*image));
+    }
+    if (!isFinite(c * cd_m2) || !isFinite(c * cd_m2 * brightest) || cd_m2 < 0 ||
+        glm::any(glm::lessThan(c, glm::dvec3(0))))
+        return context.error("scene",
+                             "'dimmer_sky_color' times 'dimmer_sky_luminance' is negative or infinite. Correct them.");
+    scene.sky_radiance_cd_m2 = c * cd_m2;
+    return {};
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,193 @@
+// The grid of lights: it leaves out work, and of light next to nothing.
+#include <bake/baked_scene.h>
+#include <bake/direct.h>
+#include <bake/light_grid.h>
+#include <bake/test_scenes.h>
+#include <tbb/global_control.h>
+
+#include <random>
+#include <set>
+
+namespace dimmer::cook::test {
+namespace {
+
+// A row of closed rooms along x, 8 m apart and 6 x 4 x 6 m each, with one lamp in every one.
+Scene rooms(int count) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    for (int r = 0; r < count; ++r) {
+        const size_t first = scene.meshes.size();
+        addBox(scene, {3, 2, 3}, white);
+        for (size_t m = first; m < scene.meshes.size(); ++m)
+            for (glm::vec3& p : scene.meshes[m].positions_m) p.x += 8.0f * static_cast<float>(r);
+        const float x = 8.0f * static_cast<float>(r);
+        addPointLight(scene, {x + 0.5f, 0.5f, -0.7f}, 60, BakeMode::Indirect);
+    }
+    return scene;
+}
+
+std::set<uint32_t> listedAt(const LightGrid& grid, glm::vec3 point) {
+    const auto list = grid.listed(point);
+    return {list.begin(), list.end()};
+}
+
+TEST(LightGrid, ListsTheLampsOfTheRoomAlone) {
+    const Scene scene = rooms(12);
+    const RayScene rays(scene);
+    const LightGrid grid(rays);
+    for (uint32_t r = 0; r < 12; ++r) {
+        const float x = 8.0f * static_cast<float>(r);
+        // Walls, corners, and the air between; a room away nothing is left, whatever the cells' width of 2 m.
+        for (const glm::vec3 p : {glm::vec3(2.99f, -1.99f, 2.99f), glm::vec3(-2.99f, 1.99f, -2.99f), glm::vec3(0)})
+            EXPECT_EQ(listedAt(grid, p + glm::vec3(x, 0, 0)), std::set<uint32_t>{r});
+    }
+}
+
+TEST(LightGrid, SpotsReachTheirConeAndRangesEnd) {
+    Scene scene;
+    addFloor(scene, 40, addMaterial(scene, lambert(0.5f)));
+    addPointLight(scene, {0, 10, 0}, 100, BakeMode::Indirect).range_m = 15.0f;
+    PunctualLight& spot = addPointLight(scene, {0, 10, 0}, 100, BakeMode::Indirect);
+    spot.type = LightType::Spot;
+    spot.direction = {0, -1, 0};
+    spot.cone_inner_cos = 0.95f;
+    spot.cone_outer_cos = 0.9f;  // a circle of 4.8 m on the floor
+    const RayScene rays(scene);
+    const LightGrid grid(rays);
+    EXPECT_EQ(listedAt(grid, {3, 0, 3}), (std::set<uint32_t>{0, 1}));
+    EXPECT_EQ(listedAt(grid, {9, 0, 0}), (std::set<uint32_t>{0}));
+    EXPECT_EQ(listedAt(grid, {25, 0, 0}), (std::set<uint32_t>{}));
+}
+
+std::set<uint32_t> askedAt(const LightGrid& grid, glm::vec3 point) {
+    std::set<uint32_t> asked;
+    grid.forEach(point, [&](uint32_t light) { EXPECT_TRUE(asked.insert(light).second) << light; });
+    return asked;
+}
+
+TEST(LightGrid, WhatIsSeenItselfOrFarOutsideIsAskedForEverywhere) {
+    Scene scene = rooms(6);
+    scene.lights[1].bake = BakeMode::None;
+    scene.lights[2].bake = BakeMode::Full;
+    scene.lights[3].type = LightType::Directional;
+    scene.lights[4].position_m = {0, 5000, 0};
+    const RayScene rays(scene);
+    EXPECT_EQ(askedAt(LightGrid(rays), {0, 0, 0}), (std::set<uint32_t>{0, 2, 3, 4}));
+    EXPECT_EQ(askedAt(LightGrid(rays, false), {0, 0, 0}), (std::set<uint32_t>{0, 2, 3, 4, 5}));
+    scene.lights.resize(1);
+    scene.lights[0].bake = BakeMode::None;
+    EXPECT_EQ(askedAt(LightGrid(rays), {0, 0, 0}), (std::set<uint32_t>{}));
+}
+
+// Neighbouring rays are 3 m apart where they meet the far end of this street, further than cells are wide.
+TEST(LightGrid, NothingIsMissedInTheOpen) {
+    Scene scene;
+    addFloor(scene, 60, addMaterial(scene, lambert(0.5f)));
+    addQuad(scene, "mast", {0, 1.5f, 0}, {0, 1.5f, 0}, {0, 0, 0.01f}, 0);
+    addPointLight(scene, {-59, 1.4f, 3}, 100, BakeMode::Indirect);
+    const RayScene rays(scene);
+    const LightGrid grid(rays);
+    for (float x = -59.5f; x < 60; x += 1)
+        for (float z = -59.5f; z < 60; z += 1) ASSERT_EQ(askedAt(grid, {x, 0, z}).size(), 1u) << x << " " << z;
+}
+
+struct Direct {
+    std::vector<std::vector<std::pair<uint32_t, glm::vec3>>> rows;  // (group, lux) per receiver
+    uint64_t rays = 0;
+};
+Direct directOf(const BakedScene& b, bool enabled) {
+    const LightGrid grid(*b.rays, enabled);
+    Direct out;
+    const auto groups = static_cast<uint32_t>(1 + b.scene.light_sets.size());
+    GroupAccumulator<Gathered> reflected(groups), stored(groups);
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        out.rays += directLight(*b.rays, grid, b.charts, b.texels, i, reflected, stored);
+        auto& row = out.rows.emplace_back();
+        for (const uint32_t g : reflected.touched()) row.emplace_back(g, reflected[g].irradiance_lux);
+        reflected.clear();
+        stored.clear();
+    }
+    return out;
+}
+
+// In closed rooms nothing is lost at all, and a receiver costs its own room's lamp alone.
+TEST(LightGrid, ClosedRoomsAreTheSameForTheRaysOfTheirOwnLamps) {
+    const BakedScene b(rooms(12), 2);
+    const Direct with = directOf(b, true), without = directOf(b, false);
+    EXPECT_EQ(with.rows, without.rows);
+    uint64_t own = 0;
+    for (size_t i = 0; i < b.texels.size(); ++i) own += b.texels.sampleCount(i);
+    EXPECT_LE(with.rays, own);
+    EXPECT_GT(without.rays, 3 * with.rays);
+}
+
+// A long room, a black wall across it that leaves an opening of `width_m` at z = 1, and 60 lamps on its -X side.
+Scene lampsBehindAWall(float width_m) {
+    Scene scene;
+    addBox(scene, {12, 2, 6}, addMaterial(scene, lambert(0.5f)));
+    Material wall = lambert(0);
+    wall.double_sided = true;
+    const uint32_t black = addMaterial(scene, wall);
+    const float left = 0.5f * (7 - 0.5f * width_m), right = 0.5f * (5 - 0.5f * width_m);
+    addQuad(scene, "wall", {0, 0, left - 6}, {0, 2, 0}, {0, 0, left}, black);
+    addQuad(scene, "wall", {0, 0, 6 - right}, {0, 2, 0}, {0, 0, right}, black);
+    std::mt19937 random(2);
+    std::uniform_real_distribution<float> unit(-1, 1);
+    for (int i = 0; i < 60; ++i)
+        addPointLight(scene, {-8 + 3 * unit(random), unit(random), 4 * unit(random)}, 50, BakeMode::Indirect);
+    return scene;
+}
+
+// Rays of a lamp are 0.055 rad apart, the opening is 0.1 rad wide from where the furthest lamp stands.
+TEST(LightGrid, NothingIsLostThroughADoorway) {
+    const BakedScene b(lampsBehindAWall(1.2f), 3, 2);
+    const Direct with = directOf(b, true), without = directOf(b, false);
+    EXPECT_EQ(with.rows, without.rows);
+    size_t lit_behind = 0;
+    for (size_t i = 0; i < b.texels.size(); ++i) lit_behind += b.place(i).x > 1 && !without.rows[i].empty();
+    EXPECT_GT(lit_behind, 100u);
+    EXPECT_LT(with.rays, without.rays);
+}
+
+// A slit of 1 cm is 0.001 rad: most lamps' rays miss it, and on their own side nothing is lost all the same.
+TEST(LightGrid, ThroughASlitLightMayBeLostButNotBeforeIt) {
+    const BakedScene b(lampsBehindAWall(0.01f), 3, 2);
+    const Direct with = directOf(b, true), without = directOf(b, false);
+    bool lost = false;
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        if (b.place(i).x < -0.1f) {
+            ASSERT_EQ(with.rows[i], without.rows[i]) << b.place(i).x;
+        }
+        lost |= with.rows[i] != without.rows[i];
+    }
+    EXPECT_TRUE(lost) << "a wider slit than the grid leaves out: the test says nothing";
+}
+
+// Sets are independent: one more, first in the file, changes no byte of another.
+TEST(LightGrid, ASetMoreChangesNoOther) {
+    Scene one = rooms(5);
+    one.light_sets = {{"a", 1}};
+    for (PunctualLight& l : one.lights) l.light_set = 0;
+    Scene two = one;
+    two.light_sets = {{"a", 1}, {"b", 1}};
+    PunctualLight extra = one.lights[0];
+    extra.position_m += glm::vec3(0.3f, 0, 0);
+    extra.light_set = 1;
+    two.lights.insert(two.lights.begin(), extra);
+    const BakedScene first(one, 2), second(two, 2);
+    const Direct of_one = directOf(first, true), of_two = directOf(second, true);
+    for (size_t i = 0; i < of_one.rows.size(); ++i)
+        for (const auto& entry : of_one.rows[i]) ASSERT_EQ(std::ranges::count(of_two.rows[i], entry), 1) << i;
+}
+
+TEST(LightGrid, ThreadsChangeNothing) {
+    const Scene scene = rooms(6);
+    const RayScene rays(scene);
+    const LightGrid many(rays);
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
+    const LightGrid one(rays);
+    for (float x = -3; x < 45; x += 0.5f) EXPECT_EQ(listedAt(many, {x, -1.9f, 0.3f}), listedAt(one, {x, -1.9f, 0.3f}));
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

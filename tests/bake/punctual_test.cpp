@@ -1,0 +1,95 @@
+// Lights against the formulas of their extensions.
+#include <bake/baked_scene.h>
+#include <bake/punctual.h>
+#include <bake/test_scenes.h>
+#include <scene/ies.h>
+
+#include <limits>
+
+namespace dimmer::cook::test {
+namespace {
+
+PunctualLight lamp(LightType type) {
+    PunctualLight light;
+    light.type = type;
+    light.intensity = {100, 50, 25};
+    light.direction = {0, -1, 0};
+    return light;
+}
+
+TEST(Punctual, InverseSquareDownToACentimetre) {
+    const PunctualLight light = lamp(LightType::Point);
+    for (const float d : {0.02f, 0.5f, 3.0f, 100.0f}) {
+        const Illumination lit = illuminate(light, {d, 0, 0});
+        EXPECT_EQ(lit.towards_light, glm::vec3(-1, 0, 0));
+        EXPECT_EQ(lit.distance_m, d);
+        EXPECT_FLOAT_EQ(lit.irradiance_lux.x, 100 / (d * d));
+        EXPECT_FLOAT_EQ(lit.irradiance_lux.z, 25 / (d * d));
+    }
+    EXPECT_FLOAT_EQ(illuminate(light, {0, 0.001f, 0}).irradiance_lux.x, 1e6f);
+    EXPECT_EQ(illuminate(light, {0, 0, 0}).irradiance_lux, glm::vec3(0));
+}
+
+TEST(Punctual, RangeIsAWindow) {
+    PunctualLight light = lamp(LightType::Point);
+    light.range_m = 4.0f;
+    EXPECT_FLOAT_EQ(illuminate(light, {0, 0, 2}).irradiance_lux.x, 25 * (1 - 1.0f / 16));
+    EXPECT_EQ(illuminate(light, {0, 0, 4}).irradiance_lux.x, 0);
+    EXPECT_EQ(illuminate(light, {0, 0, 9}).irradiance_lux.x, 0);
+}
+
+TEST(Punctual, SpotFallsOffBetweenItsCones) {
+    PunctualLight light = lamp(LightType::Spot);
+    light.cone_inner_cos = 0.9f;
+    light.cone_outer_cos = 0.5f;
+    const auto share = [&](float cos_angle) {
+        const glm::vec3 d(std::sqrt(1 - cos_angle * cos_angle), -cos_angle, 0);
+        return illuminate(light, 2.0f * d).irradiance_lux.x / 25;
+    };
+    EXPECT_FLOAT_EQ(share(1), 1);
+    EXPECT_FLOAT_EQ(share(0.95f), 1);
+    EXPECT_NEAR(share(0.7f), 0.25f, 1e-5f);  // half way in the cosine, squared
+    EXPECT_EQ(share(0.49f), 0);
+    EXPECT_EQ(share(-1), 0);
+}
+
+TEST(Punctual, SunIsTheSameEverywhere) {
+    const PunctualLight light = lamp(LightType::Directional);
+    for (const glm::vec3 p : {glm::vec3(0), glm::vec3(1e4f, -3, 7)}) {
+        const Illumination lit = illuminate(light, p);
+        EXPECT_EQ(lit.towards_light, glm::vec3(0, 1, 0));
+        EXPECT_EQ(lit.irradiance_lux, light.intensity);
+        EXPECT_EQ(lit.distance_m, std::numeric_limits<float>::infinity());
+    }
+}
+
+// A Lambertian luminaire 2 m over a floor, pointing down: E = I0 h^2 / d^4. Chords over 2.5 degrees lie at most
+// (2.5 degrees)^2 / 8 = 0.024 % of I0 below the cosine, which at the floor's corner, 60 degrees out, is 0.05 % of it.
+TEST(Punctual, AMeasuredLuminaireLightsAFloorThroughTheBaker) {
+    std::string ies = "IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 37 1 1 2 0 0 0\n1 1 20\n", candela;
+    for (int i = 0; i <= 36; ++i) {
+        ies += std::to_string(2.5 * i) + " ";
+        candela += std::to_string(300 * std::cos(2.5 * i * std::numbers::pi / 180)) + "\n";
+    }
+    const auto profile = parseLightProfile(ies + "\n0\n" + candela, "lamp.ies");
+    ASSERT_TRUE(profile.has_value()) << profile.error().message;
+
+    Scene scene;
+    addFloor(scene, 2.4f, addMaterial(scene, lambert(0)));
+    PunctualLight& light = addPointLight(scene, {0, 2, 0}, profile->profile.peak_cd, BakeMode::Full);
+    light.profile = std::make_shared<const LightProfile>(profile->profile);
+    // Its nadir, -Z, points down.
+    light.profile_from_world = glm::transpose(glm::mat3({1, 0, 0}, {0, 0, -1}, {0, 1, 0}));
+    BakedScene b(scene);
+    b.bake({.final_rays = 32});
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        const double expected = b.mean(i, [](glm::dvec3 p) {
+            const double h = 2 - p.y, d2 = p.x * p.x + p.z * p.z + h * h;
+            return 300 * h * h / (d2 * d2);
+        });
+        ASSERT_NEAR(static_cast<double>(b.lux(i).y), expected, 0.001 * expected);
+    }
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
