@@ -160,7 +160,7 @@ Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, con
 }
 
 Expected<void> measureCpu(const Pack& pack, const Mode& mode, const BenchOptions& options, BenchReport& report) {
-    CpuRuntime runtime(pack);
+    CpuRuntime runtime(pack, std::max(1u, std::thread::hardware_concurrency()));
     const Update update = [&]() -> Expected<UpdateStats> { return runtime.update(); };
     return measureAll(runtime, update, {}, options, mode.name, report.results);
 }

@@ -1,9 +1,11 @@
 #include <dimmer/cpu_runtime.h>
 
-#include <format/texel.h>
+#include <cpu/batch_blend.h>
+#include <cpu/worker_pool.h>
 #include <update/planner.h>
 
 #include <array>
+#include <atomic>
 #include <chrono>
 
 namespace dimmer {
@@ -14,39 +16,53 @@ size_t texelIndex(const PackData& data, uint32_t address) {
            TexelAddress::x(address);
 }
 
-using Records = std::array<TexelRecord, batch_receivers_max>;
-template <ColorFormat format>
-using Sums = std::array<TexelBlend<format>, batch_receivers_max>;
+// Updates of fewer batches are over before another thread has woken up.
+constexpr size_t batches_per_thread_min = 256;
+// What a thread takes at a time: large beside the counter that it is taken by, small beside an update.
+constexpr size_t batches_taken = 64;
 
+struct Pages {
+    uint32_t *irradiance, *direction;
+};
+
+// The twin of shaders/blend_texels.comp for one batch.
 template <ColorFormat format>
-void add(Sums<format>& sums, const TexelRecord* records, uint32_t count, float wr, float wg, float wb) {
-    for (uint32_t i = 0; i < count; ++i) sums[i].add(canonical(format, records[i]), wr, wg, wb);
+void blendBatch(const WorkItem& item, std::span<const WorkTerm> terms, const PackData& data, const Pages& pages) {
+    const Batch& batch = data.batches[item.batch];
+    const uint32_t offset = batch.first_receiver - data.clusters[item.cluster].first_receiver;
+    std::array<size_t, batch_receivers_max> texels;
+    std::array<TexelRecord, batch_receivers_max> records;
+    for (uint32_t i = 0; i < batch.receiver_count; ++i) {
+        texels[i] = texelIndex(data, data.addresses[batch.first_receiver + i]);
+        records[i] = data.base_pages[texels[i]];
+    }
+    if (terms.empty()) {  // the page shows the base as cooked
+        for (uint32_t i = 0; i < batch.receiver_count; ++i) records[i] = canonical(format, records[i]);
+    } else {
+        BatchBlend<format> blend(batch.receiver_count);
+        constexpr float one = weightScale(format);
+        blend.add(records.data(), one, one, one);
+        for (const WorkTerm& term : terms)
+            blend.add(&data.payload[data.terms[term.term].first_record + offset], term.weight_r, term.weight_g,
+                      term.weight_b);
+        blend.encode(records.data());
+    }
+    for (uint32_t i = 0; i < batch.receiver_count; ++i) {
+        pages.irradiance[texels[i]] = records[i].irradiance;
+        pages.direction[texels[i]] = records[i].direction;
+    }
 }
 
-// The twin of shaders/blend_texels.comp for one batch. Term by term over all receivers: records are read as they
-// lie, and the compiler vectorises the loops.
 template <ColorFormat format>
-void blendBatch(const WorkItem& item, std::span<const WorkTerm> terms, const PackData& data, Records& records) {
-    const Batch& batch = data.batches[item.batch];
-    for (uint32_t i = 0; i < batch.receiver_count; ++i)
-        records[i] = canonical(format, data.base_pages[texelIndex(data, data.addresses[batch.first_receiver + i])]);
-    // With nothing on, the page shows the base as cooked.
-    if (terms.empty()) return;
-    const Cluster& cluster = data.clusters[item.cluster];
-    Sums<format> sums{};
-    constexpr float one = weightScale(format);
-    add<format>(sums, records.data(), batch.receiver_count, one, one, one);
-    for (const WorkTerm& term : terms) {
-        const uint32_t first = data.terms[term.term].first_record;
-        add<format>(sums, &data.payload[first + (batch.first_receiver - cluster.first_receiver)], batch.receiver_count,
-                    term.weight_r, term.weight_g, term.weight_b);
-    }
-    for (uint32_t i = 0; i < batch.receiver_count; ++i) records[i] = sums[i].encode();
+void blendItems(std::span<const WorkItem> items, const WorkList& work, const PackData& data, const Pages& pages) {
+    for (const WorkItem& item : items)
+        blendBatch<format>(item, work.terms.subspan(item.first_term, item.term_count), data, pages);
 }
 
 }  // namespace
 
-CpuRuntime::CpuRuntime(const Pack& pack) : LightState(pack) {
+CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads) : LightState(pack) {
+    if (threads > 1) pool_ = std::make_unique<WorkerPool>(threads);
     const PackData& data = pack.data();
     irradiance_.resize(data.base_pages.size());
     direction_.resize(data.base_pages.size());
@@ -57,26 +73,36 @@ CpuRuntime::CpuRuntime(const Pack& pack) : LightState(pack) {
     }
 }
 
+CpuRuntime::~CpuRuntime() = default;
+CpuRuntime::CpuRuntime(CpuRuntime&&) noexcept = default;
+CpuRuntime& CpuRuntime::operator=(CpuRuntime&&) noexcept = default;
+
+// No two items write the same texel, so it does not matter who takes which.
+void CpuRuntime::blend(const WorkList& work) {
+    const PackData& data = pack().data();
+    const Pages pages{irradiance_.data(), direction_.data()};
+    const auto blend_items = data.color_format == ColorFormat::R11G11B10F ? blendItems<ColorFormat::R11G11B10F>
+                                                                          : blendItems<ColorFormat::E5B9G9R9>;
+    if (!pool_ || work.items.size() < batches_per_thread_min * pool_->threads())
+        return blend_items(work.items, work, data, pages);
+    std::atomic<size_t> next = 0;
+    pool_->run([&](uint32_t) {
+        for (;;) {
+            const size_t first = next.fetch_add(batches_taken);
+            if (first >= work.items.size()) return;
+            blend_items(work.items.subspan(first, std::min(batches_taken, work.items.size() - first)), work, data,
+                        pages);
+        }
+    });
+}
+
 UpdateStats CpuRuntime::update() {
     const auto start = std::chrono::steady_clock::now();
     const bool any = planner().plan();
     UpdateStats stats = planner().stats();
     if (any) {
-        const PackData& data = pack().data();
-        const WorkList& work = planner().work();
-        Records records;
-        const auto blend = data.color_format == ColorFormat::R11G11B10F ? blendBatch<ColorFormat::R11G11B10F>
-                                                                        : blendBatch<ColorFormat::E5B9G9R9>;
-        for (const WorkGroup& group : work.groups) stats.dispatches += group.item_count > 0;
-        for (const WorkItem& item : work.items) {
-            blend(item, work.terms.subspan(item.first_term, item.term_count), data, records);
-            const Batch& batch = data.batches[item.batch];
-            for (uint32_t i = 0; i < batch.receiver_count; ++i) {
-                const size_t texel = texelIndex(data, data.addresses[batch.first_receiver + i]);
-                irradiance_[texel] = records[i].irradiance;
-                direction_[texel] = records[i].direction;
-            }
-        }
+        for (const WorkGroup& group : planner().work().groups) stats.dispatches += group.item_count > 0;
+        blend(planner().work());
     }
     stats.host_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
     return stats;

@@ -100,6 +100,19 @@ TEST(Stability, TheOrderOfCallsIsNoPartOfTheResult) {
     EXPECT_TRUE(std::ranges::equal(forwards.directionPages(), backwards.directionPages()));
 }
 
+TEST(Stability, TheNumberOfThreadsIsNoPartOfTheResult) {
+    // 3,000 batches and more: enough that all threads work.
+    const Pack pack = packOf(test::randomPack(37, {.clusters = 2500, .page_side = 384}));
+    CpuRuntime one(pack), four(pack, 4);
+    for (const char* state : {"set1=0.5", "all=0.25,door:door0=0.5", "all=0"}) {
+        ASSERT_TRUE(one.apply(state) && four.apply(state));
+        EXPECT_GT(one.update().batches, 3000u);
+        four.update();
+        EXPECT_TRUE(std::ranges::equal(one.irradiancePages(), four.irradiancePages()));
+        EXPECT_TRUE(std::ranges::equal(one.directionPages(), four.directionPages()));
+    }
+}
+
 // Clusters and batches in another order are the same light.
 TEST(Stability, TheOrderOfClustersAndBatchesIsNoPartOfTheResult) {
     const PackData data = test::randomPack(34);

@@ -5,14 +5,22 @@
 #include <dimmer/light_state.h>
 
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
 namespace dimmer {
 
+class WorkerPool;
+struct WorkList;
+
 class CpuRuntime : public LightState {
    public:
-    explicit CpuRuntime(const Pack& pack);
+    // `threads`: how many blend large updates, the caller's included; the pages are the same whatever their number.
+    explicit CpuRuntime(const Pack& pack, uint32_t threads = 1);
+    ~CpuRuntime();
+    CpuRuntime(CpuRuntime&&) noexcept;
+    CpuRuntime& operator=(CpuRuntime&&) noexcept;
 
     // Blends what changed since the last call into the pages. Nothing changed: returns at once. Not thread-safe.
     UpdateStats update();
@@ -23,6 +31,9 @@ class CpuRuntime : public LightState {
     std::span<const uint32_t> directionPages() const { return direction_; }
 
    private:
+    void blend(const WorkList& work);
+
+    std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
     std::vector<uint32_t> direction_;
 };
