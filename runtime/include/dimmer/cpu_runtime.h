@@ -13,6 +13,7 @@ namespace dimmer {
 
 class WorkerPool;
 struct WorkList;
+struct TexelRecord;
 
 class CpuRuntime : public LightState {
    public:
@@ -36,6 +37,7 @@ class CpuRuntime : public LightState {
     std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
     std::vector<uint32_t> direction_;
+    std::vector<TexelRecord> base_;  // per receiver, in the order in which updates read it
 };
 
 // Irradiance in lux, bilinear, of pages as above (from either runtime). `uv` is 0..1 over the page; `normal_tangent`
