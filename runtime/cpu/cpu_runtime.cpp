@@ -2,11 +2,13 @@
 
 #include <cpu/batch_blend.h>
 #include <cpu/worker_pool.h>
+#include <format/probe.h>
 #include <update/planner.h>
 
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cstring>
 
 namespace dimmer {
 namespace {
@@ -63,6 +65,29 @@ void blendItems(std::span<const WorkItem> items, const WorkList& work, const Pac
         blendBatch<format>(item, work.terms.subspan(item.first_term, item.term_count), data, pages);
 }
 
+// The twin of shaders/blend_probes.comp.
+template <ColorFormat format>
+void blendProbes(const WorkList& work, const PackData& data, std::vector<uint32_t>& probes) {
+    for (const WorkItem& item : work.items) {
+        const Batch& batch = data.probes.batches[item.batch];
+        const uint32_t first = data.probes.clusters[item.cluster].first_receiver;
+        for (uint32_t i = batch.first_receiver; i < batch.first_receiver + batch.receiver_count; ++i) {
+            const uint32_t number = data.probes.numbers[i];
+            ProbeRecord record = canonicalProbe(format, data.probes.base[number]);
+            if (item.term_count > 0) {
+                ProbeBlend<format> sum;
+                constexpr float one = weightScale(format);
+                sum.add(record, one, one, one);
+                for (const WorkTerm& term : work.terms.subspan(item.first_term, item.term_count))
+                    sum.add(data.probes.payload[data.probes.terms[term.term].first_record + i - first], term.weight_r,
+                            term.weight_g, term.weight_b);
+                record = sum.encode();
+            }
+            std::memcpy(&probes[size_t{7} * number], &record, sizeof(record));
+        }
+    }
+}
+
 }  // namespace
 
 CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads) : LightState(pack) {
@@ -74,6 +99,11 @@ CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads) : LightState(pack) {
         const TexelRecord base = canonical(data.color_format, data.base_pages[i]);
         irradiance_[i] = base.irradiance;
         direction_[i] = base.direction;
+    }
+    probes_.resize(7 * data.probes.base.size());
+    for (size_t i = 0; i < data.probes.base.size(); ++i) {
+        const ProbeRecord base = canonicalProbe(data.color_format, data.probes.base[i]);
+        std::memcpy(&probes_[7 * i], &base, sizeof(base));
     }
     for (uint32_t address : data.addresses) base_.push_back(data.base_pages[texelIndex(data, address)]);
 }
@@ -108,6 +138,14 @@ UpdateStats CpuRuntime::update() {
     if (any) {
         for (const WorkGroup& group : planner().work().groups) stats.dispatches += group.item_count > 0;
         blend(planner().work());
+    }
+    if (hasProbes() && probePlanner().plan()) {
+        const auto blend_probes = pack().data().color_format == ColorFormat::R11G11B10F
+                                      ? blendProbes<ColorFormat::R11G11B10F>
+                                      : blendProbes<ColorFormat::E5B9G9R9>;
+        for (const WorkGroup& group : probePlanner().work().groups) stats.dispatches += group.item_count > 0;
+        blend_probes(probePlanner().work(), pack().data(), probes_);
+        addProbes(probePlanner().stats(), stats);
     }
     stats.host_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
     return stats;

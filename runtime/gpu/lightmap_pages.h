@@ -12,6 +12,8 @@ class LightmapPages {
     static Expected<LightmapPages> create(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
 
     LightmapImages images() const;
+    // Where shaders sample what updates write.
+    VkPipelineStageFlags readers(bool drawing) const { return sampled(drawing).stages; }
     uint64_t deviceBytes() const { return irradiance_.image.size_bytes + direction_.image.size_bytes; }
     VkImageView irradianceStorageView() const { return irradiance_.storage_view.get(); }
     VkImageView directionStorageView() const { return direction_.storage_view.get(); }

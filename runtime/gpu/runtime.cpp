@@ -1,6 +1,7 @@
 #include <dimmer/runtime.h>
 
 #include <gpu/lightmap_pages.h>
+#include <gpu/probe_blender.h>
 #include <gpu/record_loader.h>
 #include <gpu/texel_blender.h>
 #include <gpu/texel_executor.h>
@@ -53,9 +54,11 @@ struct Runtime::Impl {
     uint32_t front = 0;                       // the set to sample
     uint32_t target = 0;                      // the set that the last plan writes
     std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
-    std::optional<RecordLoader> loader;       // none in modes that load nothing later
-    std::vector<LightSet> loading;            // sets whose records are on their way
-    std::vector<RecordsState> records;        // per element
+    std::optional<ProbeBlender> probes;       // none when the pack has no probes that change
+    bool texels_planned = false, probes_planned = false;
+    std::optional<RecordLoader> loader;  // none in modes that load nothing later
+    std::vector<LightSet> loading;       // sets whose records are on their way
+    std::vector<RecordsState> records;   // per element
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
     SemaphoreHandle timeline;
@@ -65,30 +68,48 @@ struct Runtime::Impl {
 
     ~Impl() { (void)waitForSubmitted(); }
 
-    Expected<void> create(const PackData& data, const Planner& planner, const RuntimeOptions& options);
+    Expected<void> create(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                          const RuntimeOptions& options);
+    Expected<void> createExecutors(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                                   const RuntimeOptions& options, Transfer& transfer);
     Expected<void> createPages(const PackData& data, uint32_t count, Transfer& transfer);
     VkQueue ownQueue() const { return vulkan.compute_queue ? vulkan.compute_queue : vulkan.queue; }
     uint32_t ownFamily() const { return vulkan.compute_queue ? vulkan.compute_queue_family : vulkan.queue_family; }
     Expected<void> waitForSubmitted() const;
-    void recordUpdate(VkCommandBuffer commands, const Planner& planner, bool drawing);
-    Expected<void> submitUpdate(const Planner& planner, const SubmitWait& wait);
+    void recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner, bool drawing);
+    Expected<void> submitUpdate(const Planner& planner, const Planner* probe_planner, const SubmitWait& wait);
 };
 
-Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const RuntimeOptions& options) {
+Expected<void> Runtime::Impl::createExecutors(const PackData& data, const Planner& planner,
+                                              const Planner* probe_planner, const RuntimeOptions& options,
+                                              Transfer& transfer) {
+    if (!data.payload.empty()) {
+        auto made = createExecutor(vulkan, options, data, planner, pages, transfer);
+        if (!made) return std::unexpected(std::move(made.error()));
+        executor = std::move(*made);
+        if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
+    }
+    if (!probe_planner) return {};
+    auto made = ProbeBlender::create(vulkan, data, *probe_planner, static_cast<uint32_t>(pages.size()), transfer);
+    if (!made) return std::unexpected(std::move(made.error()));
+    probes = std::move(*made);
+    return {};
+}
+
+Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                                     const RuntimeOptions& options) {
     auto transfer = Transfer::create(vulkan, MemoryUse::Upload);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     // What never changes needs no second set.
-    const bool twice = options.buffering == Buffering::Double && !data.payload.empty();
+    const bool changes = !data.payload.empty() || probe_planner;
+    const bool twice = options.buffering == Buffering::Double && changes;
     DIMMER_TRY(createPages(data, twice ? 2 : 1, *transfer));
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
-    if (data.payload.empty()) return {};  // nothing can ever change
+    if (!changes) return {};
 
-    auto made_executor = createExecutor(vulkan, options, data, planner, pages, *transfer);
-    if (!made_executor) return std::unexpected(std::move(made_executor.error()));
-    executor = std::move(*made_executor);
-    if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
+    DIMMER_TRY(createExecutors(data, planner, probe_planner, options, *transfer));
     if (options.timestamps) {
         auto made_timer = UpdateTimer::create(vulkan);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
@@ -120,22 +141,27 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
     return {};
 }
 
-void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, bool drawing) {
-    executor->write(planner, target);
+void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner,
+                                 bool drawing) {
+    if (texels_planned) executor->write(planner, target);
+    if (probes_planned) probes->write(*probe_planner, target);
     if (timer) timer->reset(commands);
-    pages[target].beginWrites(commands, drawing);
+    if (texels_planned) pages[target].beginWrites(commands, drawing);
     if (timer) timer->begin(commands);
-    stats.dispatches = executor->dispatch(commands, planner, target);
+    if (texels_planned) stats.dispatches += executor->dispatch(commands, planner, target);
+    if (probes_planned)
+        stats.dispatches += probes->dispatch(commands, *probe_planner, target, pages[target].readers(drawing));
     if (timer) timer->end(commands);
-    pages[target].endWrites(commands, drawing);
+    if (texels_planned) pages[target].endWrites(commands, drawing);
     timed = timer.has_value();
 }
 
-Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const SubmitWait& wait) {
+Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner* probe_planner,
+                                           const SubmitWait& wait) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, planner, vulkan.compute_queue == VK_NULL_HANDLE);
+    recordUpdate(own.commands, planner, probe_planner, vulkan.compute_queue == VK_NULL_HANDLE);
     DIMMER_VK(vkEndCommandBuffer, own.commands);
 
     const VkSemaphore semaphore = timeline.get();
@@ -166,7 +192,8 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
     impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
     Runtime runtime(pack, std::move(impl));
-    DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(), options));
+    DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(),
+                                     runtime.hasProbes() ? &runtime.probePlanner() : nullptr, options));
     for (uint32_t i = 0; i < pack.elements().size() && !options.load_records; ++i)
         if (pack.elements()[i].kind == ElementKind::LightSet) runtime.hold(LightSet{i}, true);
     return runtime;
@@ -183,23 +210,35 @@ bool Runtime::planNext() {
     Impl& impl = *impl_;
     impl.timed = false;
     impl.stats = {};
-    bool any = false;
-    if (impl.pages.size() == 1) {
-        any = planner().plan();
+    impl.texels_planned = impl.probes_planned = false;
+    const bool in_place = impl.pages.size() == 1;
+    impl.target = in_place ? 0 : impl.front ^ 1;
+    Planner& next = planner(impl.target);
+    if (!in_place && next.waiting()) {
+        impl.texels_planned = next.planWaiting();  // of one state to its end: pages are shown when they are complete
     } else {
-        impl.target = impl.front ^ 1;
-        Planner& next = planner(impl.target);
-        if (next.waiting())
-            any = next.planWaiting();  // of one state to its end: a set of pages is shown when it is complete
-        else if (planner(impl.front).upToDate())
-            return false;
-        else
-            any = next.plan();
-        // The other pages may hold the state already, when it is one of before.
-        if (!any) impl.front = impl.target;
+        const bool current = planner(impl.front).upToDate() && (!hasProbes() || probePlanner(impl.front).upToDate());
+        if (!in_place && current) return false;
+        impl.texels_planned = next.plan();
+        impl.probes_planned = hasProbes() && probePlanner(impl.target).plan();
     }
-    impl.stats = planner(impl.target).stats();
+    impl.stats = next.stats();
+    if (impl.probes_planned) addProbes(probePlanner(impl.target).stats(), impl.stats);
+    const bool any = impl.texels_planned || impl.probes_planned;
+    // The other pages may hold the state already, when it is one of before.
+    if (!any) impl.front = impl.target;
     return any;
+}
+
+// What was planned cannot be carried out.
+void Runtime::rollback() {
+    if (impl_->texels_planned) planner(impl_->target).rollback();
+    if (impl_->probes_planned) probePlanner(impl_->target).rollback();
+    impl_->timed = false;
+}
+
+const Planner* Runtime::plannedProbes() const {
+    return impl_->probes_planned ? &probePlanner(impl_->target) : nullptr;
 }
 
 // What was planned has been sent or recorded.
@@ -213,10 +252,10 @@ Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
     if (planNext()) {
         // An update that submit() sent may still be reading the work list.
         if (auto done = impl_->waitForSubmitted(); !done) {
-            planner(impl_->target).rollback();
+            rollback();
             return std::unexpected(std::move(done.error()));
         }
-        impl_->recordUpdate(commands, planner(impl_->target), true);
+        impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
         finish(0);
     }
     impl_->stats.host_us = microsecondsSince(start);
@@ -231,10 +270,9 @@ Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
-    if (sent) sent = impl_->submitUpdate(planner(impl_->target), wait);
+    if (sent) sent = impl_->submitUpdate(planner(impl_->target), plannedProbes(), wait);
     if (!sent) {
-        planner(impl_->target).rollback();
-        impl_->timed = false;
+        rollback();
         return std::unexpected(std::move(sent.error()));
     }
     finish(planning_us + microsecondsSince(start));
@@ -330,6 +368,11 @@ uint32_t Runtime::pageSet() const {
     return impl_->front;
 }
 
+VkBuffer Runtime::probes(uint32_t page_set) const {
+    if (!impl_->probes) return VK_NULL_HANDLE;
+    return impl_->probes->probes(std::min(page_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+}
+
 DeviceFootprint Runtime::footprint() const {
     DeviceFootprint footprint;
     for (const LightmapPages& pages : impl_->pages) footprint.bytes += pages.deviceBytes();
@@ -338,6 +381,10 @@ DeviceFootprint Runtime::footprint() const {
         if (impl_->loader) footprint.bytes += impl_->loader->deviceBytes();
         footprint.pipelines = impl_->executor->pipelineCount();
     }
+    if (impl_->probes) {
+        footprint.bytes += impl_->probes->deviceBytes();
+        footprint.pipelines += impl_->probes->pipelineCount();
+    }
     return footprint;
 }
 
@@ -345,7 +392,12 @@ Expected<Runtime::Pages> Runtime::readPages() {
     DIMMER_TRY(impl_->waitForSubmitted());  // perhaps on another queue
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
-    return impl_->pages[impl_->front].read(*transfer);
+    auto pages = impl_->pages[impl_->front].read(*transfer);
+    if (!pages || !impl_->probes) return pages;
+    auto probes = impl_->probes->read(impl_->front, *transfer);
+    if (!probes) return std::unexpected(std::move(probes.error()));
+    pages->probes = std::move(*probes);
+    return pages;
 }
 
 }  // namespace dimmer

@@ -26,7 +26,8 @@ DevicePlaces placesOf(const PackData& data);
 struct DeviceBytes {
     uint64_t base_lightmap = 0;  // the page images
     uint64_t dynamic = 0;        // records of every contribution, and the base of the receivers that they touch
-    uint64_t ancillary = 0;      // addresses, tables, the largest work list, and the gaps between clusters
+    uint64_t ancillary =
+        0;  // addresses, tables, the largest work list, gaps between clusters, and the probes themselves
     uint64_t total() const { return base_lightmap + dynamic + ancillary; }
 };
 

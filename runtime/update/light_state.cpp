@@ -92,15 +92,21 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 }  // namespace
 
 LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack), held_(pack.elements().size()) {
-    const auto tables = std::make_shared<const PlanTables>(pack_.data());
-    for (uint32_t i = 0; i < page_sets; ++i) planners_.push_back(std::make_unique<Planner>(pack_.data(), tables));
+    const PackData& data = pack_.data();
+    const auto add = [&](const ReceiverView& receivers, std::vector<std::unique_ptr<Planner>>& planners) {
+        const auto tables = std::make_shared<const PlanTables>(data, receivers);
+        for (uint32_t i = 0; i < page_sets; ++i) planners.push_back(std::make_unique<Planner>(data, receivers, tables));
+    };
+    add(data.texelView(), planners_);
+    if (!data.probes.payload.empty()) add(data.probes.view(), probe_planners_);
 }
 LightState::~LightState() = default;
 LightState::LightState(LightState&&) noexcept = default;
 LightState& LightState::operator=(LightState&&) noexcept = default;
 
 void LightState::setElement(uint32_t element, Weight weight) {
-    for (auto& planner : planners_) planner->setElement(element, normalised(weight));
+    for (auto* planners : {&planners_, &probe_planners_})
+        for (auto& planner : *planners) planner->setElement(element, normalised(weight));
 }
 
 Expected<void> LightState::checkHeld(uint32_t element, const Weight& weight) const {

@@ -38,7 +38,7 @@ std::array<float, 3> stepsAt(ColorFormat format, uint32_t base) {
 
 }  // namespace
 
-PlanTables::PlanTables(const PackData& data) {
+PlanTables::PlanTables(const PackData& data, const ReceiverView& receivers) {
     contributions_of_element = makeLists<uint32_t>(data.elements.size(), [&](auto pair) {
         for (uint32_t k = 0; k < data.contributions.size(); ++k) {
             const Contribution& c = data.contributions[k];
@@ -48,13 +48,13 @@ PlanTables::PlanTables(const PackData& data) {
         }
     });
     holders_of_contribution = makeLists<Holder>(data.contributions.size(), [&](auto pair) {
-        for (uint32_t i = 0; i < data.clusters.size(); ++i) {
-            const Cluster& c = data.clusters[i];
+        for (uint32_t i = 0; i < receivers.clusters.size(); ++i) {
+            const Cluster& c = receivers.clusters[i];
             for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t)
-                pair(data.terms[t].contribution, Holder{i, t});
+                pair(receivers.terms[t].contribution, Holder{i, t});
         }
     });
-    for (const Cluster& c : data.clusters) overlap_max = std::max(overlap_max, c.term_count);
+    for (const Cluster& c : receivers.clusters) overlap_max = std::max(overlap_max, c.term_count);
 }
 
 std::vector<float> quantaPerWeight(const PackData& data) {

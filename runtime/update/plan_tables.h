@@ -24,15 +24,15 @@ struct Holder {
 };
 
 struct PlanTables {
-    explicit PlanTables(const PackData& data);
+    PlanTables(const PackData& data, const ReceiverView& receivers);
 
     Lists<uint32_t> contributions_of_element;
     Lists<Holder> holders_of_contribution;  // ascending by cluster
     uint32_t overlap_max = 0;               // the largest number of contributions of any cluster
 };
 
-// Per term of the pack: by how many quanta of the output at most a change of its weight by 1 moves any receiver of the
-// cluster. The output is never below the base, so the base's quantum is the smallest one that the output can have.
+// Per term of the texels: by how many quanta of the output at most a change of its weight by 1 moves any receiver of
+// the cluster. The output is never below the base, so the base's quantum is the smallest one that the output can have.
 std::vector<float> quantaPerWeight(const PackData& data);
 
 }  // namespace dimmer

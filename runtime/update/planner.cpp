@@ -19,8 +19,8 @@ float distance(const Weight& a, const Weight& b) {
 
 }  // namespace
 
-Planner::Planner(const PackData& data, std::shared_ptr<const PlanTables> tables)
-    : data_(data), tables_(std::move(tables)) {
+Planner::Planner(const PackData& data, const ReceiverView& receivers, std::shared_ptr<const PlanTables> tables)
+    : data_(data), receivers_(receivers), tables_(std::move(tables)) {
     for (const Element& element : data.elements)
         elements_.emplace_back(element.kind == ElementKind::LightSet ? std::min(1.0f, element.max_weight) : 0.0f);
     planned_.assign(data.contributions.size(), Weight(0));
@@ -30,10 +30,10 @@ Planner::Planner(const PackData& data, std::shared_ptr<const PlanTables> tables)
     dirty_elements_.reserve(data.elements.size());
     dirty_contributions_.reserve(data.contributions.size());
     changes_.reserve(data.contributions.size());
-    waiting_.resize(data.clusters.size());
-    waiting_clusters_.reserve(data.clusters.size());
-    cluster_marks_.resize((data.clusters.size() + 63) / 64);
-    parts_.reserve(data.clusters.size());
+    waiting_.resize(receivers.clusters.size());
+    waiting_clusters_.reserve(receivers.clusters.size());
+    cluster_marks_.resize((receivers.clusters.size() + 63) / 64);
+    parts_.reserve(receivers.clusters.size());
     items_.resize(itemsMax());
     terms_.reserve(termsMax());
 
@@ -53,7 +53,7 @@ void Planner::setLimits(const UpdateLimits& limits) {
     recheck_ = true;
     if (!quanta_per_weight_.empty() || (limits.receivers_max == 0 && limits.tolerance_quanta == 0)) return;
     quanta_per_weight_ = quantaPerWeight(data_);
-    for (const ClusterTerm& term : data_.terms) written_.push_back(planned_[term.contribution]);
+    for (const ClusterTerm& term : receivers_.terms) written_.push_back(planned_[term.contribution]);
 }
 
 void Planner::markDirty(uint32_t contribution) {
@@ -105,13 +105,13 @@ void Planner::collectChanges() {
 void Planner::waitWhole(uint32_t cluster) {
     Waiting& waiting = waiting_[cluster];
     if (waiting.count == 0) waiting_clusters_.push_back(cluster);
-    waiting.count = data_.clusters[cluster].batch_count;
+    waiting.count = receivers_.clusters[cluster].batch_count;
 }
 
 void Planner::touch(const Holder& holder, const Weight& before, const Weight& now) {
     Waiting& waiting = waiting_[holder.cluster];
     if (limits_.tolerance_quanta > 0 && waiting.count == 0 &&
-        quantaPutOff(data_.clusters[holder.cluster]) <= limits_.tolerance_quanta) {
+        quantaPutOff(receivers_.clusters[holder.cluster]) <= limits_.tolerance_quanta) {
         ++stats_.clusters_put_off;
         return;
     }
@@ -124,19 +124,19 @@ void Planner::touch(const Holder& holder, const Weight& before, const Weight& no
 float Planner::quantaPutOff(const Cluster& cluster) const {
     float quanta = 0;
     for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
-        quanta += distance(written_[t], planned_[data_.terms[t].contribution]) * quanta_per_weight_[t];
+        quanta += distance(written_[t], planned_[receivers_.terms[t].contribution]) * quanta_per_weight_[t];
     return quanta;
 }
 
 void Planner::touchAllPutOff() {
     if (written_.empty()) return;
-    for (uint32_t i = 0; i < data_.clusters.size(); ++i)
-        if (waiting_[i].count == 0 && quantaPutOff(data_.clusters[i]) > limits_.tolerance_quanta) waitWhole(i);
+    for (uint32_t i = 0; i < receivers_.clusters.size(); ++i)
+        if (waiting_[i].count == 0 && quantaPutOff(receivers_.clusters[i]) > limits_.tolerance_quanta) waitWhole(i);
 }
 
 // Up to so many receivers of a cluster's waiting batches become a part, one batch at least.
 void Planner::take(uint32_t cluster_index, uint32_t receivers) {
-    const Cluster& cluster = data_.clusters[cluster_index];
+    const Cluster& cluster = receivers_.clusters[cluster_index];
     Waiting& waiting = waiting_[cluster_index];
     const uint32_t batches = std::min(waiting.count, std::max(1u, receivers / batch_receivers_max));
     parts_.push_back({cluster_index, waiting.first, batches});
@@ -146,7 +146,7 @@ void Planner::take(uint32_t cluster_index, uint32_t receivers) {
     waiting = {};
     if (written_.empty()) return;
     for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
-        written_[t] = planned_[data_.terms[t].contribution];
+        written_[t] = planned_[receivers_.terms[t].contribution];
 }
 
 // In ascending order: neighbours on the pages are neighbours in memory. Through a bit per cluster, without sorting.
@@ -187,17 +187,17 @@ void Planner::takeWithin(uint32_t receivers) {
     for (uint32_t cluster : waiting_clusters_) {
         ++waiting_[cluster].plans;
         stats_.receivers_waiting +=
-            std::min(waiting_[cluster].count * batch_receivers_max, data_.clusters[cluster].receiver_count);
+            std::min(waiting_[cluster].count * batch_receivers_max, receivers_.clusters[cluster].receiver_count);
     }
 }
 
 // Lists the cluster's terms that are on, and counts.
 void Planner::planPart(Part& part) {
-    const Cluster& cluster = data_.clusters[part.cluster];
+    const Cluster& cluster = receivers_.clusters[part.cluster];
     part.first_term = static_cast<uint32_t>(terms_.size());
     const float scale = weightScale(data_.color_format);
     for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
-        const Weight& w = planned_[data_.terms[t].contribution];
+        const Weight& w = planned_[receivers_.terms[t].contribution];
         if (isOn(w)) terms_.push_back({t, w.r * scale, w.g * scale, w.b * scale});
     }
     part.term_count = static_cast<uint32_t>(terms_.size()) - part.first_term;
@@ -206,14 +206,14 @@ void Planner::planPart(Part& part) {
         receivers = 0;
         for (uint32_t b = 0; b < part.batch_count; ++b)
             receivers +=
-                data_.batches[cluster.first_batch + (part.first_batch + b) % cluster.batch_count].receiver_count;
+                receivers_.batches[cluster.first_batch + (part.first_batch + b) % cluster.batch_count].receiver_count;
     }
     work_.groups[workGroupOf(part.term_count)].item_count += part.batch_count;
     ++stats_.clusters;
     stats_.batches += part.batch_count;
     stats_.receivers += receivers;
-    stats_.bytes_read += receivers * (sizeof(uint32_t) + sizeof(TexelRecord) * (1 + part.term_count));
-    stats_.bytes_written += receivers * sizeof(TexelRecord);
+    stats_.bytes_read += receivers * (sizeof(uint32_t) + receivers_.record_bytes * (1 + part.term_count));
+    stats_.bytes_written += receivers * receivers_.record_bytes;
 }
 
 void Planner::emitWork() {
@@ -222,7 +222,7 @@ void Planner::emitWork() {
     for (uint32_t g = 1; g < work_group_count; ++g)
         next[g] = work_.groups[g].first_item = work_.groups[g - 1].first_item + work_.groups[g - 1].item_count;
     for (const Part& part : parts_) {
-        const Cluster& cluster = data_.clusters[part.cluster];
+        const Cluster& cluster = receivers_.clusters[part.cluster];
         uint32_t& item = next[workGroupOf(part.term_count)];
         for (uint32_t b = 0; b < part.batch_count; ++b) {
             const uint32_t batch = (part.first_batch + b) % cluster.batch_count;

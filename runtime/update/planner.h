@@ -44,13 +44,15 @@ class Planner {
    public:
     // `data` must be valid and must outlive the planner. Pages are taken to hold the base. Reserves for the worst
     // case, so that later calls allocate nothing.
-    Planner(const PackData& data, std::shared_ptr<const PlanTables> tables);
-    explicit Planner(const PackData& data) : Planner(data, std::make_shared<const PlanTables>(data)) {}
+    Planner(const PackData& data, const ReceiverView& receivers, std::shared_ptr<const PlanTables> tables);
+    Planner(const PackData& data, const ReceiverView& receivers)
+        : Planner(data, receivers, std::make_shared<const PlanTables>(data, receivers)) {}
+    explicit Planner(const PackData& data) : Planner(data, data.texelView()) {}  // of the lightmap's texels
 
     const Weight& element(uint32_t index) const { return elements_[index]; }
     // Constant time; takes effect with the next plan().
     void setElement(uint32_t index, Weight weight);
-    // In range already. The first limits of a planner cost a pass over the pack's records.
+    // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records.
     void setLimits(const UpdateLimits& limits);
 
     // Plans what changed since the last plan(), and what waits, and counts it as written. Cost: constant when there is
@@ -75,8 +77,8 @@ class Planner {
     const UpdateStats& stats() const { return stats_; }
 
     // Largest sizes of a work list, for buffers.
-    uint32_t itemsMax() const { return static_cast<uint32_t>(data_.batches.size()); }
-    uint32_t termsMax() const { return static_cast<uint32_t>(data_.terms.size()); }
+    uint32_t itemsMax() const { return static_cast<uint32_t>(receivers_.batches.size()); }
+    uint32_t termsMax() const { return static_cast<uint32_t>(receivers_.terms.size()); }
     // The largest number of contributions of any cluster.
     uint32_t overlapMax() const { return tables_->overlap_max; }
 
@@ -112,6 +114,7 @@ class Planner {
     void emitWork();
 
     const PackData& data_;
+    const ReceiverView receivers_;
     std::shared_ptr<const PlanTables> tables_;
     UpdateLimits limits_;
     std::vector<float> quanta_per_weight_;  // per term; empty until there are limits
@@ -134,5 +137,15 @@ class Planner {
     WorkList work_;
     UpdateStats stats_;
 };
+
+// Adds what an update did to probes to what it did to texels.
+inline void addProbes(const UpdateStats& probes, UpdateStats& stats) {
+    stats.contributions_changed = std::max(stats.contributions_changed, probes.contributions_changed);
+    stats.clusters += probes.clusters;
+    stats.batches += probes.batches;
+    stats.receivers += probes.receivers;
+    stats.bytes_read += probes.bytes_read;
+    stats.bytes_written += probes.bytes_written;
+}
 
 }  // namespace dimmer

@@ -31,12 +31,16 @@ class CpuRuntime : public LightState {
     std::span<const uint32_t> irradiancePages() const { return irradiance_; }
     std::span<const uint32_t> directionPages() const { return direction_; }
 
+    // The light probes by their number, 7 words each; see runtime/format/probe.h.
+    std::span<const uint32_t> probes() const { return probes_; }
+
    private:
     void blend(const WorkList& work);
 
     std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
     std::vector<uint32_t> direction_;
+    std::vector<uint32_t> probes_;
     std::vector<TexelRecord> base_;  // per receiver, in the order in which updates read it
 };
 

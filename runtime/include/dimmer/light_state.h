@@ -33,10 +33,10 @@ struct Weight {
 // What an update may leave for later. In every case the pages end up exactly as the weights say, once changes stop
 // (and the tolerance is 0).
 struct UpdateLimits {
-    // Receivers that one update writes at most, in whole batches of up to 64; 0: no limit. The most visible changes
-    // come first, and what waits counts for more with every update.
+    // Texels that one update writes at most (probes are always up to date), in whole batches of up to 64; 0: no limit.
+    // The most visible changes come first, and what waits counts for more with every update.
     uint32_t receivers_max = 0;
-    // A cluster of receivers is left as it is while none of their stored irradiances is further from what the weights
+    // A cluster of texels is left as it is while none of their stored irradiances is further from what the weights
     // say than so many steps of the format, counted from what was last written. At 0.5 the stored value is one step off
     // at most. 0: everything is written.
     float tolerance_quanta = 0;
@@ -76,6 +76,10 @@ class LightState {
     explicit LightState(const Pack& pack, uint32_t page_sets = 1);
     Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }
     const Planner& planner(uint32_t page_set = 0) const { return *planners_[page_set]; }
+    // Of the light probes; none where the pack has no dynamic light on any.
+    bool hasProbes() const { return !probe_planners_.empty(); }
+    Planner& probePlanner(uint32_t page_set = 0) { return *probe_planners_[page_set]; }
+    const Planner& probePlanner(uint32_t page_set = 0) const { return *probe_planners_[page_set]; }
     // A held set is at 0 and refuses other weights: its records are not there. Released, it is still at 0.
     void hold(LightSet set, bool held);
     Expected<void> checkSet(LightSet set) const;
@@ -85,7 +89,7 @@ class LightState {
     Expected<void> checkHeld(uint32_t element, const Weight& weight) const;
 
     Pack pack_;
-    std::vector<std::unique_ptr<Planner>> planners_;
+    std::vector<std::unique_ptr<Planner>> planners_, probe_planners_;
     std::vector<bool> held_;  // per element
 };
 

@@ -127,6 +127,9 @@ class Runtime : public LightState {
     LightmapImages images() const { return images(pageSet()); }
     LightmapImages images(uint32_t page_set) const;
     uint32_t pageSet() const;
+    // The light probes that go with a set of pages, by their number, 7 words each (see runtime/format/probe.h): a
+    // storage buffer, null where the pack has no dynamic light on any.
+    VkBuffer probes(uint32_t page_set) const;
     // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
     // changes anything has its pages and nothing else.
     DeviceFootprint footprint() const;
@@ -134,6 +137,7 @@ class Runtime : public LightState {
     // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime.
     struct Pages {
         std::vector<uint32_t> irradiance, direction;
+        std::vector<uint32_t> probes;  // empty where probes() is null
     };
     Expected<Pages> readPages();
 
@@ -141,6 +145,8 @@ class Runtime : public LightState {
     struct Impl;
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl);
     bool planNext();
+    void rollback();
+    const Planner* plannedProbes() const;
     Expected<void> checkLoadable(LightSet set) const;
     void finishLoading();
     void finish(double host_us);
