@@ -67,8 +67,9 @@ void blendItems(std::span<const WorkItem> items, const WorkList& work, const Pac
 
 // The twin of shaders/blend_probes.comp.
 template <ColorFormat format>
-void blendProbes(const WorkList& work, const PackData& data, std::vector<uint32_t>& probes) {
-    for (const WorkItem& item : work.items) {
+void blendProbes(std::span<const WorkItem> items, const WorkList& work, const PackData& data,
+                 std::vector<uint32_t>& probes) {
+    for (const WorkItem& item : items) {
         const Batch& batch = data.probes.batches[item.batch];
         const uint32_t first = data.probes.clusters[item.cluster].first_receiver;
         for (uint32_t i = batch.first_receiver; i < batch.first_receiver + batch.receiver_count; ++i) {
@@ -112,39 +113,50 @@ CpuRuntime::~CpuRuntime() = default;
 CpuRuntime::CpuRuntime(CpuRuntime&&) noexcept = default;
 CpuRuntime& CpuRuntime::operator=(CpuRuntime&&) noexcept = default;
 
-// No two items write the same texel, so it does not matter who takes which.
-void CpuRuntime::blend(const WorkList& work) {
-    const PackData& data = pack().data();
-    const Pages pages{irradiance_.data(), direction_.data(), base_.data()};
-    const auto blend_items = data.color_format == ColorFormat::R11G11B10F ? blendItems<ColorFormat::R11G11B10F>
-                                                                          : blendItems<ColorFormat::E5B9G9R9>;
-    if (!pool_ || work.items.size() < batches_per_thread_min * pool_->threads())
-        return blend_items(work.items, work, data, pages);
+// No two items write the same receiver, so it does not matter who takes which.
+void CpuRuntime::forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend) {
+    if (!pool_ || work.items.size() < batches_per_thread_min * pool_->threads()) return blend(work.items);
     std::atomic<size_t> next = 0;
     pool_->run([&](uint32_t) {
         for (;;) {
             const size_t first = next.fetch_add(batches_taken);
             if (first >= work.items.size()) return;
-            blend_items(work.items.subspan(first, std::min(batches_taken, work.items.size() - first)), work, data,
-                        pages);
+            blend(work.items.subspan(first, std::min(batches_taken, work.items.size() - first)));
         }
     });
 }
 
+template <ColorFormat format>
+void CpuRuntime::updateTexels() {
+    const PackData& data = pack().data();
+    const WorkList& work = planner().work();
+    const Pages pages{irradiance_.data(), direction_.data(), base_.data()};
+    forItems(work, [&](std::span<const WorkItem> items) { blendItems<format>(items, work, data, pages); });
+}
+
+template <ColorFormat format>
+void CpuRuntime::updateProbes() {
+    const PackData& data = pack().data();
+    const WorkList& work = probePlanner().work();
+    forItems(work, [&](std::span<const WorkItem> items) { blendProbes<format>(items, work, data, probes_); });
+}
+
 UpdateStats CpuRuntime::update() {
     const auto start = std::chrono::steady_clock::now();
-    const bool any = planner().plan();
+    const bool shared_exponent = pack().data().color_format == ColorFormat::E5B9G9R9;
+    const auto countDispatches = [](const WorkList& work) {
+        return static_cast<uint32_t>(
+            std::ranges::count_if(work.groups, [](const WorkGroup& group) { return group.item_count > 0; }));
+    };
+    const bool texels = planner().plan();
     UpdateStats stats = planner().stats();
-    if (any) {
-        for (const WorkGroup& group : planner().work().groups) stats.dispatches += group.item_count > 0;
-        blend(planner().work());
+    if (texels) {
+        stats.dispatches += countDispatches(planner().work());
+        shared_exponent ? updateTexels<ColorFormat::E5B9G9R9>() : updateTexels<ColorFormat::R11G11B10F>();
     }
     if (hasProbes() && probePlanner().plan()) {
-        const auto blend_probes = pack().data().color_format == ColorFormat::R11G11B10F
-                                      ? blendProbes<ColorFormat::R11G11B10F>
-                                      : blendProbes<ColorFormat::E5B9G9R9>;
-        for (const WorkGroup& group : probePlanner().work().groups) stats.dispatches += group.item_count > 0;
-        blend_probes(probePlanner().work(), pack().data(), probes_);
+        stats.dispatches += countDispatches(probePlanner().work());
+        shared_exponent ? updateProbes<ColorFormat::E5B9G9R9>() : updateProbes<ColorFormat::R11G11B10F>();
         addProbes(probePlanner().stats(), stats);
     }
     stats.host_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();

@@ -26,31 +26,31 @@ struct ProbeBlend {
         const auto lifted = TexelBlend<format>::lift(dc.irradiance);
         const std::array<float, 3> part = {wr * lifted[0], wg * lifted[1], wb * lifted[2]};
         for (size_t c = 0; c < 3; ++c) light[c] += part[c];
-        for (size_t i = 0; i < probe_codes; ++i) bands[i] += part[i % 3] * offsetCode(record, i);
+        // In arrays of 24, which compilers take as three vectors of eight.
+        std::array<float, probe_codes> parts;
+        for (size_t i = 0; i < probe_codes; ++i) parts[i] = part[i % 3];
+        const auto codes = std::bit_cast<std::array<uint8_t, probe_codes>>(record.bands);
+        for (size_t i = 0; i < probe_codes; ++i) bands[i] += parts[i] * static_cast<float>(codes[i] ^ 0x80);
     }
 
     ProbeRecord encode() const {
-        ProbeRecord record{.light = TexelBlend<format>::encodeLight(light[0], light[1], light[2]), .bands = {}};
-        std::array<bool, 3> usable;
-        std::array<float, 3> inverse;
-        for (size_t c = 0; c < 3; ++c) {
-            usable[c] = light[c] >= blend_luminance_min && light[c] <= blend_luminance_max;
-            inverse[c] = 1.0f / (usable[c] ? light[c] : 1.0f);
-        }
+        std::array<float, probe_codes> inverse;
+        std::array<uint32_t, probe_codes> usable;  // all bits, or none where there is no light to divide by
         for (size_t i = 0; i < probe_codes; ++i) {
-            const size_t c = i % 3;
-            const auto mean =
-                static_cast<uint32_t>(static_cast<int>((usable[c] ? bands[i] : 0.0f) * inverse[c] + 0.5f));
-            const uint32_t code = usable[c] ? mean : 128u;
-            record.bands[i / 4] |= (code ^ 0x80u) << (8 * (i % 4));
+            const float l = light[i % 3];
+            const bool in_range = l >= blend_luminance_min && l <= blend_luminance_max;
+            usable[i] = in_range ? ~0u : 0u;
+            inverse[i] = 1.0f / (in_range ? l : 1.0f);
         }
-        return record;
-    }
-
-   private:
-    // A signed byte plus 128: an unsigned number without a conditional.
-    static float offsetCode(const ProbeRecord& record, size_t i) {
-        return static_cast<float>(static_cast<int>((record.bands[i / 4] >> (8 * (i % 4)) & 0xffu) ^ 0x80u));
+        std::array<uint8_t, probe_codes> codes;
+        for (size_t i = 0; i < probe_codes; ++i) {
+            // What is not usable may be NaN, which has no integer: its bits are gone before it is used.
+            const float sum = std::bit_cast<float>(std::bit_cast<uint32_t>(bands[i]) & usable[i]);
+            const auto mean = static_cast<uint32_t>(static_cast<int>(sum * inverse[i] + 0.5f));
+            codes[i] = static_cast<uint8_t>(((mean & usable[i]) | (128u & ~usable[i])) ^ 0x80u);
+        }
+        return {TexelBlend<format>::encodeLight(light[0], light[1], light[2]),
+                std::bit_cast<std::array<uint32_t, probe_words>>(codes)};
     }
 };
 

@@ -5,6 +5,7 @@
 #include <dimmer/light_state.h>
 
 #include <array>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -13,6 +14,7 @@ namespace dimmer {
 
 class WorkerPool;
 struct WorkList;
+struct WorkItem;
 struct TexelRecord;
 
 class CpuRuntime : public LightState {
@@ -35,7 +37,11 @@ class CpuRuntime : public LightState {
     std::span<const uint32_t> probes() const { return probes_; }
 
    private:
-    void blend(const WorkList& work);
+    template <ColorFormat format>
+    void updateTexels();
+    template <ColorFormat format>
+    void updateProbes();
+    void forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend);
 
     std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
