@@ -14,7 +14,8 @@ OUT = ROOT / "out/bench"
 MODES = ["worklist", "per-combination", "gather", "scatter", "cpu"]
 ESTATE = [(f"estate, {n:,} clusters", f"estate_{n}", ["--like", "estate", "--clusters", str(n)])
           for n in (100, 1000, 10000)]
-OTHERS = [(name, name, ["--like", name]) for name in ("consulate", "townhoused", "safehouse", "yard")]
+OTHERS = [(name, name, ["--like", name]) for name in ("consulate", "townhoused", "safehouse", "yard")] + [
+    ("estate, 1,000 clusters, with probes", "estate_probes", ["--like", "estate", "--clusters", "1000", "--probes"])]
 GROWTH = [("estate, 1,000 clusters", "estate_1000", ["--like", "estate", "--clusters", "1000"])] + [
     (f"{n} x the receivers and clusters", f"estate_x{n}",
      ["--like", "estate", "--scale", str(n), "--clusters", str(1000 * n)]) for n in (2, 4, 8)] + [
@@ -52,7 +53,7 @@ def modes_table(levels, frames):
         work = by_mode["worklist"]
         rows.append([label, f"{work['receivers'] / 1e6:.2f}"] + [f"{cost(report, by_mode[m]):.1f}" for m in MODES] +
                     [f"{work['efficiency']:.2f}", f"{work['efficiency_pages']:.2f}"])
-    return table(["level", "M texels active", *MODES, "roof / worklist", "pages' roof / worklist"], rows)
+    return table(["level", "M receivers", *MODES, "roof / worklist", "pages' roof / worklist"], rows)
 
 
 def growth_table(frames):

@@ -1,6 +1,7 @@
-// Blends work items of lightmap texels (see dimmer/work_list.glsl), each texel written once. A lane takes two neighbouring receivers at a time, so
-// that a record of both is one load of 16 bytes, and eight lanes walk through a batch of up to 64. Batches of different
-// clusters share a workgroup: a cluster of a handful of texels leaves seven lanes idle, not sixty-three.
+// Blends work items of lightmap texels (see dimmer/work_list.glsl), each texel written once. A lane takes two
+// neighbouring receivers at a time, so that a record of both is one load of 16 bytes, and eight lanes walk through a
+// batch of up to 64. Batches of different clusters share a workgroup: a cluster of a handful of texels leaves seven
+// lanes idle, not sixty-three.
 // The CPU twin is blendBatch in runtime/cpu/cpu_runtime.cpp.
 #version 450
 #extension GL_GOOGLE_include_directive : require

@@ -48,7 +48,7 @@ struct RuntimeOptions {
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
     // always-on light that doors let through is loaded in any case.
     bool load_records = true;
-    // Write GPU timestamps around each update, read by stats(). Off costs nothing.
+    // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
 };
 
@@ -110,8 +110,8 @@ class Runtime : public LightState {
     Expected<UpdateStats> wait();
 
     // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
-    // the next update takes its light off the pages. What was record()ed before must have been submitted. Unsupported
-    // in modes gather and scatter.
+    // the next update takes its light off the pages. What was record()ed before must have been submitted, and have
+    // completed where submit() has another queue. Unsupported in modes gather and scatter.
     Expected<void> dropRecords(LightSet set);
     // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room.
     // Loaded, the set is at 0 and takes any weight.
