@@ -15,6 +15,11 @@ glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
     return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
 }
 
+// Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
+uint32_t firstSample(const GatherOptions& options) {
+    return options.first_ray / std::max(options.rays, 1u) * options.emitter_samples;
+}
+
 }  // namespace
 
 void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
@@ -72,8 +77,8 @@ glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float 
 void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, GroupAccumulator<Gathered>& sum) const {
     const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const uint32_t index = options.first_ray + i;
-        const SamplePoint& origin = from.points[index % from.points.size()];
+        const uint32_t index = firstSample(options) + i;
+        const SamplePoint& origin = from.points[(index + seed) % from.points.size()];
         const SkySample s = sky_.sample(sequence2d(index, seed));
         const glm::vec3 d = toTangent(unwrap_.frames[origin.face], s.direction);
         if (!(s.pdf > 0) || !(d.z > 0)) continue;
@@ -88,13 +93,14 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, G
 void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,
                               GroupAccumulator<Gathered>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
+    const uint32_t any_point = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const SamplePoint& origin = from.points[i % from.points.size()];
+        const uint32_t index = firstSample(options) + i;
+        const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.group);
-            const uint32_t index = options.first_ray + i;
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(frame, s.direction);

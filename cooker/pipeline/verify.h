@@ -76,6 +76,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
 
 // What one light set adds, alone, at candidates all over the level (paths go where its light goes).
 Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::span<const VerifyPoint> points,
-                                  uint32_t set, uint32_t seed, Progress& progress);
+                                  uint32_t set, uint32_t seed, Progress& progress,
+                                  uint32_t paths_max = VerifyOptions{}.paths_max);
 
 }  // namespace dimmer::cook
