@@ -55,7 +55,8 @@ uint64_t RecordStore::firstByte(uint32_t contribution) const {
 }
 
 void RecordStore::fill(uint32_t contribution, uint64_t offset, std::span<std::byte> piece) const {
-    fillFrom(runs_[contribution], [&](uint32_t i) { return canonical(data_->color_format, data_->payload[i]); })(offset, piece);
+    fillFrom(runs_[contribution], [&](uint32_t i) { return canonical(data_->color_format, data_->payload[i]); })(offset,
+                                                                                                                 piece);
 }
 
 }  // namespace dimmer
