@@ -61,7 +61,7 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         if (path == no_path) continue;
         if (hit) {
             take(ray, *hit, path);
-        } else if (const uint32_t term = paths_.term(always_group, path); sky && term != no_term) {
+        } else if (const uint32_t term = paths_.term(always_group, path); sky && term != no_term && sum.wants(term)) {
             sum[term].add(missed(options, world, d.z) * lux_per_radiance, d);
         }
     }
@@ -98,7 +98,7 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
         const float by_hit = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
-        if (const uint32_t term = paths_.term(e->group, path); term != no_term)
+        if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
             ray.sum[term].add(e->radiance_cd_m2 * (ray.lux_per_radiance * by_hit / (by_hit + by_area)), ray.tangent);
     }
     const uint32_t found = receiverOf(unwrap_, texels_, hit);
@@ -109,7 +109,7 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
     const bool as_it_is = path == free_path && ray.from.condition == no_condition;
     for (const TermLight& light : ray.outgoing->row(found)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
-        if (term != no_term) ray.sum[term].add(light.value * ray.lux_per_radiance, ray.tangent);
+        if (term != no_term && ray.sum.wants(term)) ray.sum[term].add(light.value * ray.lux_per_radiance, ray.tangent);
     }
 }
 
@@ -134,7 +134,7 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, T
         const float by_cosine = static_cast<float>(options.rays) * d.z / pi;
         forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
-                       if (const uint32_t term = paths_.term(always_group, path); term != no_term)
+                       if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
                            sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
                    });
     }
@@ -163,6 +163,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
         const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
+            if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.group);
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
@@ -174,7 +175,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, s.distance_m * shadow_end_share,
                        [&](float passed, uint32_t path) {
                            const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
-                           if (term != no_term)
+                           if (term != no_term && sum.wants(term))
                                sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
                        });
         }

@@ -40,6 +40,9 @@ struct GatherOptions {
     uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
+    // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
+    // all are.
+    std::span<const uint32_t> wanted_in_group;
 };
 
 // Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
@@ -68,7 +71,7 @@ class Gatherer {
         : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), paths_(paths), sky_(rays.scene()) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
-    // receivers that rays hit. `links`, when given, takes where the rays ended.
+    // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
     // Unbiased: emitters are found by area and by hit, an image sky by its own density and by miss, weighted by the
     // balance heuristic (Veach 1995).
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
