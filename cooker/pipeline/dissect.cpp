@@ -6,6 +6,7 @@
 #include <charts/wall_cuts.h>
 #include <encode/encode.h>
 #include <pipeline/cook.h>
+#include <scene/open_pose.h>
 
 #include <tbb/parallel_for.h>
 
@@ -46,6 +47,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     const Quality& quality = *settings->profile.quality(settings->quality);
     auto bake = std::make_unique<Rebake>();
     bake->scene = std::move(scene);
+    addOpenLeaves(bake->scene);
     cutAtWalls(bake->scene, settings->profile.texels_per_metre);
     bake->rays.emplace(bake->scene);
     auto charts = unwrap(*bake->rays, {settings->profile.texels_per_metre, settings->profile.page_size});
@@ -219,6 +221,18 @@ std::vector<glm::vec3> tiltedNormals(uint32_t point) {
     return out;
 }
 
+// With every door closed.
+std::optional<Hit> nearestClosed(const RayScene& rays, glm::vec3 origin, glm::vec3 direction, uint32_t seed) {
+    constexpr float far_m = 1e30f;
+    auto hit = rays.nearest(origin, direction, far_m, seed, Surfaces::Walls);
+    if (!rays.anyLeaf()) return hit;
+    for (const Hit& leaf : rays.leavesAlong(origin, direction, hit ? hit->distance_m : far_m)) {
+        const bool there = rays.triangles()[leaf.triangle].condition % 2 == 0;
+        if (there && unitFloat(hash(seed, leaf.triangle)) < rays.alphaAt(leaf.triangle, leaf.u, leaf.v)) return leaf;
+    }
+    return hit;
+}
+
 // A plain gather: emitters by hit alone.
 void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std::span<const glm::vec3> normals,
                    TermAccumulator<Falloff>& sum) {
@@ -228,7 +242,7 @@ void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std
         const glm::vec3 d = cosineDirection(sequence2d(i, hash(id, gather_seed)));
         if (!(d.z > 1e-3f)) continue;
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const auto hit = bake.rays->nearest(from.position_m, world, 1e30f, i);
+        const auto hit = nearestClosed(*bake.rays, from.position_m, world, i);
         if (!hit) {
             sum[always_group].add(lux_per_radiance * skyRadiance(bake.scene, world), d, normals);
             continue;
