@@ -42,9 +42,20 @@ float FinalGather::State::varianceOfMean() const {
     return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
 }
 
+// At the doors that the terms are about.
+void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options) {
+    aims_.clear();
+    for (uint32_t t : terms) {
+        const uint32_t door = options.aim_at_doors ? gatherer_.paths().onlyDoor(t) : no_door;
+        if (door != no_door && std::ranges::find(aims_, door, &DoorAim::door) == aims_.end())
+            aims_.push_back(gatherer_.aimAt(from, door));
+    }
+}
+
 uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
                              const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
     for (uint32_t t : terms) state_[t] = {};
+    aim(from, terms, options);
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
     size_t waiting = terms.size();
     uint64_t traced = 0;
@@ -54,8 +65,8 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
                           .emitter_samples = options.emitter_samples,
                           .seed = options.seed,
                           .first_ray = r * rays_per_round},
-                         &outgoing, round_, nullptr);
-        traced += rays_per_round;
+                         &outgoing, round_, nullptr, aims_);
+        traced += rays_per_round + aims_.size() * aimed_rays;
         for (uint32_t t : terms) {
             State& s = state_[t];
             if (s.done) continue;
