@@ -60,6 +60,7 @@ class Expansion {
         bounce();
         decideActivity();
         out_.rays = rays_traced_;
+        out_.doors_seen = std::move(doors_seen_);
         return std::move(out_);
     }
 
