@@ -9,8 +9,12 @@ import json
 import math
 import os
 import pathlib
+import resource
+import shutil
+import statistics
 import subprocess
 import tempfile
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 LEVELS = ROOT.parent / "shared/levels"
@@ -18,6 +22,8 @@ TRUTH = ROOT.parent / "shared/truth"
 PAGE = ROOT / "docs/measurements.md"
 DIMMER = str((ROOT / os.environ.get("DIMMER_BIN", "build/bin") / "dimmer").resolve())
 HOUSE = ROOT / "game_sample/levels/house.gltf"
+HOUSE_PROFILE = ROOT / "game_sample/house_profile.json"
+CAUSES = ["noise", "series_expansion", "texel_size", "activity_threshold", "colour_format", "directional_model"]
 NORMAL_MEAN, NORMAL_P95 = math.sqrt(2 / math.pi), 1.959964  # magnitude of a standard normal number
 
 
@@ -115,7 +121,9 @@ def pack_tables(levels, quality, folder):
     errors, effects = [], []
     for level in levels:
         pack = folder / f"{level}.dimmer"
+        started = time.monotonic()
         dimmer("cook", LEVELS / f"{level}.glb", "-o", pack, "--quality", quality)
+        print(f"{level}: cooked in {time.monotonic() - started:.1f} s", flush=True)
         states = {n: s for n, s in level_states(level).items() if "door:" not in s}
         truth = {n: read(TRUTH / f"{level}.surface.{n}.csv") for n in states}
         floor = 0.01 * sum(t for t, _ in truth["all_on"]) / len(truth["all_on"])
@@ -142,11 +150,11 @@ def pack_tables(levels, quality, folder):
 
 
 def verify_tables(levels, quality, points, paths, folder):
-    errors, effects = [], []
-    for name, level in levels:
+    errors, effects, causes, formats = [], [], [], []
+    for name, level, profile in levels:
         pack, report = folder / "verify.dimmer", folder / "verify.json"
-        dimmer("cook", level, "-o", pack, "--quality", quality)
-        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--json", report)
+        dimmer("cook", level, "-o", pack, "--quality", quality, "--profile", profile)
+        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--causes", "--formats", "--json", report)
         found = json.loads(report.read_text())
         for kind in ("surface", "tilted"):
             f = found[kind]
@@ -157,8 +165,72 @@ def verify_tables(levels, quality, points, paths, folder):
             effects.append([name, s["name"], percent(s["error"]), f"{100 * s['bias']:+.2f} %",
                             percent(s["reference_noise"]), str(s["points"]), percent(s["energy_dropped"])])
             print(*effects[-1], flush=True)
+        causes.append([name, *(percent(found["causes"][c]) for c in CAUSES)])
+        print(*causes[-1], flush=True)
+        for color, model in dict.fromkeys((f["color"], f["model"]) for f in found["formats"]):
+            cells = [f"{percent(f['mean'])}, {percent(f['p95'])}" for f in found["formats"]
+                     if (f["color"], f["model"]) == (color, model)]
+            formats.append([name, f"{color}, {model}", *cells])
     return (table(["level", "normals", "points", "mean", "95th percentile", "RMSE", "bias", "reference error"], errors),
-            table(["level", "light set", "error", "bias", "reference noise", "points", "energy dropped"], effects))
+            table(["level", "light set", "error", "bias", "reference noise", "points", "energy dropped"], effects),
+            table(["level", *(c.replace("_", " ") for c in CAUSES)], causes),
+            table(["level", "stored as", "1 set: mean, 95 %", "3 sets", "8 sets"], formats))
+
+
+def house_variant(folder, name, rename):
+    """The house with other light sets: rename(set, how many of it came before) -> set or None (always on)."""
+    level = json.loads(HOUSE.read_text())
+    seen = {}
+    for part in level["nodes"] + level.get("meshes", []) + level.get("materials", []) + level.get("lights", []):
+        extras = part.get("extras", {})
+        if "dimmer_light_set" not in extras:
+            continue
+        old = extras["dimmer_light_set"]
+        new = rename(old, seen.get(old, 0))
+        seen[old] = seen.get(old, 0) + 1
+        extras.pop("dimmer_max_weight", None)
+        if new is None:
+            extras.pop("dimmer_light_set")
+        else:
+            extras["dimmer_light_set"] = new
+    shutil.copy(HOUSE.parent / "house.bin", folder)
+    file = folder / f"{name}.gltf"
+    file.write_text(json.dumps(level))
+    return file
+
+
+def cook_seconds(level, quality, folder, *options):
+    """Processor seconds of a cook, what it traced and what it stored."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    text = dimmer("cook", level, "-o", folder / "sets.dimmer", "--quality", quality, *options)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    overlap = json.loads(dimmer("inspect", folder / "sets.dimmer", "--json", "-"))
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, text, overlap
+
+
+def sets_table(folder, runs=5):
+    """What light sets cost: the same lights all always on, in 12 and 24 sets, and with a gather for each set."""
+    variants = [("all lights in the base", house_variant(folder, "base", lambda s, i: None), []),
+                ("12 sets", HOUSE, []),
+                ("24 sets", house_variant(folder, "sets24", lambda s, i: f"{s}{i % 2}"), []),
+                ("24 sets, --per-set-passes", folder / "sets24.gltf", ["--per-set-passes"])]
+    rows = []
+    for quality in ("draft", "final"):
+        taken = {name: [] for name, _, _ in variants}
+        for _ in range(runs):  # in turns: what else the machine does falls on all alike
+            for name, level, options in variants:
+                seconds, text, pack = cook_seconds(level, quality, folder, *options)
+                taken[name].append((seconds, text, pack))
+        first = statistics.median(t[0] for t in taken[variants[0][0]])
+        for name, _, _ in variants:
+            seconds = statistics.median(t[0] for t in taken[name])
+            text, pack = taken[name][0][1:]
+            histogram = pack["overlap_histogram"]
+            pairs, texels = sum(n * count for n, count in enumerate(histogram)), sum(histogram)
+            rays = text.split(" rays")[0].split(", ")[-1]
+            rows.append([quality, name, f"{seconds:.2f}", f"{seconds / first:.2f}", rays, f"{pairs / texels:.1f}"])
+            print(*rows[-1], flush=True)
+    return table(["quality", "the house with", "CPU s", "times the base", "rays", "mean overlap"], rows)
 
 
 def refresh(topic, text):
@@ -177,13 +249,15 @@ def main():
     parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
-    parser.add_argument("--only", choices=["reference", "packs", "verify"], help="one part of it")
+    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets"], help="one part of it")
     options = parser.parse_args()
     levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
     if not levels:
         print("the levels with given irradiance are not here: the house alone is measured")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
+        if options.only in (None, "sets"):
+            refresh("sets", "`scripts/bench bake --only sets`\n\n" + sets_table(folder))
         if levels and options.only in (None, "reference"):
             refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
                     + reference_table(levels, options.paths, folder))
@@ -192,10 +266,11 @@ def main():
             refresh(f"packs {options.quality}", f"`scripts/bench bake --only packs --quality {options.quality}`\n\n"
                     f"{errors}\n\n{effects}")
         if options.only in (None, "verify"):
-            measured = [("house", HOUSE)] + [(n, LEVELS / f"{n}.glb") for n in levels if n == "two_rooms"]
-            errors, effects = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
+            measured = [("house", HOUSE, "desktop"), ("house, own profile", HOUSE, HOUSE_PROFILE)]
+            measured += [(n, LEVELS / f"{n}.glb", "desktop") for n in levels if n == "two_rooms"]
+            tables = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
             refresh(f"verify {options.quality}", f"`scripts/bench bake --only verify --quality {options.quality} "
-                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n{errors}\n\n{effects}")
+                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n" + "\n\n".join(tables))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
-// Blends work items of lightmap texels (see dimmer/work_list.glsl), each texel written once. A lane takes two neighbouring receivers at a time, so
-// that a record of both is one load of 16 bytes, and eight lanes walk through a batch of up to 64. Batches of different
-// clusters share a workgroup: a cluster of a handful of texels leaves seven lanes idle, not sixty-three.
+// Blends work items of lightmap texels (see dimmer/work_list.glsl), each texel written once. A lane takes two
+// neighbouring receivers at a time, so that a record of both is one load of 16 bytes, and eight lanes walk through a
+// batch of up to 64. Batches of different clusters share a workgroup: a cluster of a handful of texels leaves seven
+// lanes idle, not sixty-three.
 // The CPU twin is blendBatch in runtime/cpu/cpu_runtime.cpp.
 #version 450
 #extension GL_GOOGLE_include_directive : require
@@ -26,10 +27,9 @@ layout(set = 0, binding = 1) uniform utextureBuffer base;       // two records a
 layout(set = 0, binding = 2) uniform utextureBuffer payload;    // two records an element
 layout(set = 0, binding = 3) uniform utextureBuffer work;       // WorkItem
 layout(set = 0, binding = 4) uniform utextureBuffer terms;      // WorkTerm
-layout(set = 0, binding = 5) uniform utextureBuffer places;         // BatchPlace
-layout(set = 0, binding = 6) uniform utextureBuffer first_records;  // per cluster and contribution of it
-layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray irradiance_pages;
-layout(set = 0, binding = 8, r32ui) writeonly uniform uimage2DArray direction_pages;
+layout(set = 0, binding = 5) uniform utextureBuffer places;     // BatchPlace
+layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray irradiance_pages;
+layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray direction_pages;
 
 const uint lanes_per_item = 8u;
 const uint receivers_per_lane = 2u;
@@ -52,7 +52,7 @@ uvec4 load_pair(uint first_record, uint offset) {
 // The item's first record of a term, and its weight.
 uvec4 locate(Item item, uint index) {
     uvec4 term = texelFetch(terms, int(item.work.y + index));
-    return uvec4(texelFetch(first_records, int(item.place.w + term.x)).x + item.place.z, term.yzw);
+    return uvec4(term.x + item.place.z, term.yzw);
 }
 
 // Past an item's last term its record stands in, weighted with 0: that changes no bit of a sum.

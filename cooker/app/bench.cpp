@@ -134,9 +134,11 @@ Expected<void> measureAll(LightState& state, const Update& update, const Roof& r
 
 // More than any update of the pack moves.
 Expected<CopyRoof> roofFor(const VulkanContext& vulkan, const PackData& data) {
-    const uint64_t written = data.addresses.size() * sizeof(TexelRecord);
-    return CopyRoof::create(vulkan, written + data.addresses.size() * 4 + data.payload.size() * sizeof(TexelRecord),
-                            written);
+    const ProbeData& probes = data.probes;
+    const uint64_t receivers = data.addresses.size() + probes.numbers.size();
+    const uint64_t written = data.addresses.size() * sizeof(TexelRecord) + probes.numbers.size() * sizeof(ProbeRecord);
+    const uint64_t payload = data.payload.size() * sizeof(TexelRecord) + probes.payload.size() * sizeof(ProbeRecord);
+    return CopyRoof::create(vulkan, written + receivers * sizeof(uint32_t) + payload, written);
 }
 
 Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, const Mode& mode,
@@ -160,7 +162,7 @@ Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, con
 }
 
 Expected<void> measureCpu(const Pack& pack, const Mode& mode, const BenchOptions& options, BenchReport& report) {
-    CpuRuntime runtime(pack);
+    CpuRuntime runtime(pack, std::max(1u, std::thread::hardware_concurrency()));
     const Update update = [&]() -> Expected<UpdateStats> { return runtime.update(); };
     return measureAll(runtime, update, {}, options, mode.name, report.results);
 }

@@ -46,6 +46,7 @@ void addSynthCommand(CLI::App& app, int& exit_code) {
     c->add_option("--scale", a->options.scale, "times the level's texels")->capture_default_str();
     c->add_option("--clusters", a->options.clusters, "distinct lists of contributions")->capture_default_str();
     c->add_option("--sets", a->options.light_sets, "light sets; 0: as many as the level")->capture_default_str();
+    c->add_flag("--probes", a->options.probes, "light probes as well, as many as the level has");
     c->add_option("--seed", a->options.seed, "of the random numbers")->capture_default_str();
     c->footer("Example: dimmer synth --like estate --clusters 1000 -o estate.dimmer");
     c->callback([a, &exit_code] { exit_code = run(*a); });

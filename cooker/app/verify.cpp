@@ -1,6 +1,7 @@
 #include <app/command.h>
 #include <app/terminal_progress.h>
 #include <pipeline/heat_map.h>
+#include <pipeline/profile.h>
 #include <pipeline/verify.h>
 
 #include <fmt/format.h>
@@ -33,6 +34,10 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
                            : fmt::format("not converged within {} paths per point; what the noise adds is taken off",
                                          options.paths_max));
     for (const auto& [name, mean] : r.causes) fmt::print("cause {:<20} {:>6.2f} %\n", name, 100 * mean);
+    if (!r.formats.empty()) fmt::print("\n{:<12} {:<8} {:>6} {:>8} {:>8}\n", "format", "model", "sets", "mean", "p95");
+    for (const FormatError& f : r.formats)
+        fmt::print("{:<12} {:<8} {:>6} {:>6.2f} % {:>6.2f} %\n", nameOf(f.color_format), nameOf(f.direction_model),
+                   f.sets, 100 * f.mean, 100 * f.p95);
     if (r.sets.empty()) return;
     fmt::print("\n{:<26} {:>8} {:>8} {:>8} {:>10} {:>14}\n", "light set, alone", "error", "bias", "points",
                "ref. noise", "energy dropped");
@@ -61,6 +66,12 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     j["tilted"] = toJson(r.tilted);
     j["causes"] = r.causes;
     j["sets"] = nlohmann::ordered_json::array();
+    for (const FormatError& f : r.formats)
+        j["formats"].push_back({{"color", nameOf(f.color_format)},
+                                {"model", nameOf(f.direction_model)},
+                                {"sets", f.sets},
+                                {"mean", f.mean},
+                                {"p95", f.p95}});
     for (const SetReport& s : r.sets)
         j["sets"].push_back({{"name", s.name},
                              {"error", s.effect.error},
@@ -108,6 +119,9 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_option("--seed", a->options.seed, "of points and paths")->capture_default_str();
     c->add_flag("--no-sets", a->no_sets, "leave out what each light set does alone");
+    c->add_flag("--causes", a->options.causes,
+                "tell the error's causes apart, by baking the first passes again (doors closed)");
+    c->add_flag("--formats", a->options.formats, "what each colour format and directional model would cost here");
     c->add_option("--max-error", a->max_error,
                   "exit with 4 when the mean error at surfaces is above, e.g. 0.1 for 10 %")
         ->check(CLI::NonNegativeNumber);

@@ -52,9 +52,17 @@ void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, c
     }
 }
 
+void FinalGather::want(uint32_t term, bool wanted) {
+    round_.setWanted(term, wanted);
+    wanted_in_group_[gatherer_.paths().terms()[term].group] += wanted ? 1u : UINT32_MAX;
+}
+
 uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
                              const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
-    for (uint32_t t : terms) state_[t] = {};
+    for (uint32_t t : terms) {
+        state_[t] = {};
+        want(t, true);
+    }
     aim(from, terms, options);
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
     size_t waiting = terms.size();
@@ -64,7 +72,8 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
                          {.rays = rays_per_round,
                           .emitter_samples = options.emitter_samples,
                           .seed = options.seed,
-                          .first_ray = r * rays_per_round},
+                          .first_ray = r * rays_per_round,
+                          .wanted_in_group = wanted_in_group_},
                          &outgoing, round_, nullptr, aims_);
         traced += rays_per_round + aims_.size() * aimed_rays;
         for (uint32_t t : terms) {
@@ -74,12 +83,15 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
             const float interval = normal_95 * std::sqrt(s.varianceOfMean());
             s.done = r + 1 >= rounds_min && options.noise_max > 0 &&
                      interval <= options.noise_max * (s.mean + options.floor_lux[t]);
-            waiting -= s.done;
+            if (!s.done) continue;
+            want(t, false);
+            --waiting;
         }
         round_.clear();
     }
     for (uint32_t t : terms) {
         const State& s = state_[t];
+        if (!s.done) want(t, false);
         out.push_back({t, s.sum * (1 / static_cast<float>(s.rounds)), s.varianceOfMean()});
     }
     return traced;

@@ -28,7 +28,12 @@ inline constexpr uint32_t rays_per_round = 32;
 class FinalGather {
    public:
     explicit FinalGather(const Gatherer& gatherer)
-        : gatherer_(gatherer), round_(gatherer.paths().termCount()), state_(gatherer.paths().termCount()) {}
+        : gatherer_(gatherer),
+          round_(gatherer.paths().termCount()),
+          state_(gatherer.paths().termCount()),
+          wanted_in_group_(gatherer.paths().groupCount()) {
+        round_.wantNone();
+    }
 
     // Appends to `out` the light of `terms` (ascending) at `from`. Rays are shared, decisions are not: a term's
     // value and sample count do not depend on which other terms are asked for. Returns the rays traced.
@@ -46,11 +51,13 @@ class FinalGather {
         float varianceOfMean() const;
     };
     void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
+    void want(uint32_t term, bool wanted);
 
     const Gatherer& gatherer_;
     std::vector<DoorAim> aims_;
-    TermAccumulator<Gathered> round_;
+    TermAccumulator<Gathered> round_;  // wants the terms that are not done
     std::vector<State> state_;
+    std::vector<uint32_t> wanted_in_group_;
 };
 
 }  // namespace dimmer::cook

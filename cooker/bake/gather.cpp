@@ -17,6 +17,11 @@ glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
     return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
 }
 
+// Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
+uint32_t firstSample(const GatherOptions& options) {
+    return options.first_ray / std::max(options.rays, 1u) * options.emitter_samples;
+}
+
 }  // namespace
 
 void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
@@ -132,7 +137,7 @@ float Gatherer::shareOf(const Ray& ray, uint32_t term) const {
 
 void Gatherer::takeSky(const Ray& ray, uint32_t path) const {
     const uint32_t term = paths_.term(always_group, path);
-    if (term == no_term || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
+    if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
     // An image sky has rays of its own; see sampleSky.
     if (ray.aim && !sky_.empty()) return;
     const float share = sky_.empty() ? shareOf(ray, term) : pi / static_cast<float>(ray.options.rays);
@@ -169,7 +174,7 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
         const float by_hit = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
-        if (const uint32_t term = paths_.term(e->group, path); term != no_term)
+        if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
             ray.sum[term].add(
                 e->radiance_cd_m2 * (pi / static_cast<float>(ray.options.rays) * by_hit / (by_hit + by_area)),
                 ray.tangent);
@@ -182,7 +187,7 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
     const bool as_it_is = path == free_path && ray.from.condition == no_condition;
     for (const TermLight& light : ray.outgoing->row(found)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
-        if (term == no_term) continue;
+        if (term == no_term || !ray.sum.wants(term)) continue;
         if (const float share = shareOf(ray, term); share > 0) ray.sum[term].add(light.value * share, ray.tangent);
     }
 }
@@ -199,8 +204,8 @@ glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float 
 void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const {
     const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const uint32_t index = options.first_ray + i;
-        const SamplePoint& origin = from.points[index % from.points.size()];
+        const uint32_t index = firstSample(options) + i;
+        const SamplePoint& origin = from.points[(index + seed) % from.points.size()];
         const SkySample s = sky_.sample(sequence2d(index, seed));
         const glm::vec3 d = toTangent(unwrap_.frames[origin.face], s.direction);
         if (!(s.pdf > 0) || !(d.z > 0)) continue;
@@ -208,7 +213,7 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, T
         const float by_cosine = static_cast<float>(options.rays) * d.z / pi;
         forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
-                       if (const uint32_t term = paths_.term(always_group, path); term != no_term)
+                       if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
                            sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
                    });
     }
@@ -231,13 +236,15 @@ uint32_t Gatherer::onto(uint32_t path, uint32_t own, uint32_t target) const {
 void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,
                               TermAccumulator<Gathered>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
+    const uint32_t any_point = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const SamplePoint& origin = from.points[i % from.points.size()];
+        const uint32_t index = firstSample(options) + i;
+        const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
+            if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.group);
-            const uint32_t index = options.first_ray + i;
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(frame, s.direction);
@@ -247,7 +254,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, s.distance_m * shadow_end_share,
                        [&](float passed, uint32_t path) {
                            const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
-                           if (term != no_term)
+                           if (term != no_term && sum.wants(term))
                                sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
                        });
         }

@@ -41,6 +41,9 @@ struct GatherOptions {
     uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
+    // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
+    // all are.
+    std::span<const uint32_t> wanted_in_group;
 };
 
 // Rays towards one door and what it lights, for the terms with that door alone.
@@ -84,7 +87,7 @@ class Gatherer {
           guides_(rays) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
-    // receivers that rays hit. `links`, when given, takes where the rays ended.
+    // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
     // `aims`: doors that get `aimed_rays` each besides. Unbiased: emitters are found by area and by hit, an image sky
     // by its own density and by miss, what surfaces and a constant sky send through an aimed door by its rays and all
     // others, weighted by the balance heuristic (Veach 1995).

@@ -66,21 +66,26 @@ class Expansion {
 
    private:
     // Moves `sum` to a row. `least`, when not empty, leaves out what is fainter than that, per term.
-    static void takeRow(TermAccumulator<Gathered>& sum, std::span<const float> least, std::vector<TermLight>& row) {
+    template <class Value>
+    static void takeRow(TermAccumulator<Value>& sum, std::span<const float> least, std::vector<TermLight>& row) {
         row.clear();
         for (uint32_t t : sum.touched())
-            if (least.empty() || luminance(sum[t].irradiance_lux) >= least[t])
-                row.push_back({t, sum[t].irradiance_lux});
+            if (const glm::vec3 lux = irradianceOf(sum[t]); least.empty() || luminance(lux) >= least[t])
+                row.push_back({t, lux});
         sum.clear();
     }
+    static glm::vec3 irradianceOf(const Gathered& light) { return light.irradiance_lux; }
+    static glm::vec3 irradianceOf(glm::vec3 lux) { return lux; }
 
     // What surfaces reflect at the first bounce: punctual light, emitters and the sky. The rays that look for emitters
     // and sky leave behind which receivers see one another: the links that the series follows.
     void directPass() {
         progress_.stage("direct light and links", texels_.size());
         links_.assign(texels_.size() * settings_.series_rays, no_index);
-        const GatherOptions options{
-            .rays = settings_.series_rays, .emitter_samples = settings_.emitter_samples, .seed = settings_.seed};
+        GatherOptions options;
+        options.rays = settings_.series_rays;
+        options.emitter_samples = settings_.emitter_samples;
+        options.seed = settings_.seed;
         SparseLight::Builder direct(texels_.size()), left_to_renderer(texels_.size());
         Sparse<ReceiverLight>::Builder stored(texels_.size());
         Sparse<GatherLinks::ThroughDoors>::Builder door_links(texels_.size());
@@ -126,7 +131,7 @@ class Expansion {
     // What leaves each receiver: rho / pi * (direct + bounced so far).
     SparseLight outgoing(const SparseLight& bounced) const {
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            TermAccumulator<Gathered> sum(terms_);
+            TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
                 const glm::vec3 reflect = texels_.reflectance[i] / pi;
@@ -134,7 +139,7 @@ class Expansion {
                 for (const auto* part : {&out_.direct, &bounced})
                     for (const TermLight& l : part->row(i))
                         if (const uint32_t term = paths_.leaving(l.term, own); term != no_term)
-                            sum[term].irradiance_lux += reflect * l.value;
+                            sum[term] += reflect * l.value;
                 takeRow(sum, {}, row);
                 emit(std::span<const TermLight>(row));
             }
@@ -145,7 +150,7 @@ class Expansion {
     SparseLight follow(const SparseLight& radiance) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
-            TermAccumulator<Gathered> sum(terms_);
+            TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
                 const uint32_t own = gatherer_.conditionOf(i);
@@ -155,12 +160,12 @@ class Expansion {
                     for (const TermLight& l : radiance.row(from))
                         if (const uint32_t term = own == no_condition ? l.term : paths_.moved(l.term, free_path, own);
                             term != no_term)
-                            sum[term].irradiance_lux += lux_per_radiance * l.value;
+                            sum[term] += lux_per_radiance * l.value;
                 }
                 for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
                     for (const TermLight& l : radiance.row(link.receiver))
                         if (const uint32_t term = paths_.moved(l.term, link.path, own); term != no_term)
-                            sum[term].irradiance_lux += lux_per_radiance * l.value;
+                            sum[term] += lux_per_radiance * l.value;
                 takeRow(sum, least_, row);
                 emit(std::span<const TermLight>(row));
             }

@@ -92,7 +92,12 @@ using SparseLight = Sparse<TermLight>;
 template <class Value>
 class TermAccumulator {
    public:
-    explicit TermAccumulator(uint32_t terms) : values_(terms), used_(terms) {}
+    explicit TermAccumulator(uint32_t terms) : values_(terms), used_(terms), unwanted_(terms) {}
+
+    // What nobody wants need not be added up; all are wanted to begin with.
+    bool wants(uint32_t term) const { return !unwanted_[term]; }
+    void setWanted(uint32_t term, bool wanted) { unwanted_[term] = !wanted; }
+    void wantNone() { std::ranges::fill(unwanted_, uint8_t{1}); }
 
     Value& operator[](uint32_t term) {
         if (!used_[term]) {
@@ -116,7 +121,7 @@ class TermAccumulator {
 
    private:
     std::vector<Value> values_;
-    std::vector<uint8_t> used_;
+    std::vector<uint8_t> used_, unwanted_;
     std::vector<uint32_t> touched_;
 };
 

@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <update/device_places.h>
 
 #include <algorithm>
 
 namespace dimmer::cook {
 namespace {
 
-constexpr uint64_t record_bytes = sizeof(TexelRecord), address_bytes = 4;
-constexpr uint64_t work_item_bytes = 16, work_term_bytes = 8, weight_bytes = 16;
+constexpr uint64_t record_bytes = sizeof(TexelRecord);
 
 std::string megabytes(uint64_t bytes) {
     return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
@@ -29,10 +29,10 @@ std::string largestElements(const PackData& pack, const PackCost& cost) {
 PackCost costOf(const PackData& pack) {
     PackCost cost;
     const uint64_t receivers = pack.addresses.size();
-    cost.base_lightmap = pack.base_pages.size() * record_bytes;
-    cost.dynamic = (pack.payload.size() + receivers) * record_bytes;
-    cost.ancillary = receivers * address_bytes + pack.batches.size() * work_item_bytes +
-                     pack.terms.size() * work_term_bytes + pack.contributions.size() * weight_bytes;
+    const DeviceBytes bytes = deviceBytesOf(pack);
+    cost.base_lightmap = bytes.base_lightmap;
+    cost.dynamic = bytes.dynamic;
+    cost.ancillary = bytes.ancillary;
     for (const Mesh& m : pack.meshes)
         cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
     for (uint32_t e = 0; e < pack.elements.size(); ++e) {

@@ -41,19 +41,6 @@ uint64_t peakBytes() {
     return static_cast<uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
-    return {.series_rays = quality.series_rays,
-            .final_rays = quality.rays,
-            .emitter_samples = quality.emitter_samples,
-            .noise_max = quality.noise,
-            .denoise = quality.denoise != 0,
-            .bounces_max = quality.bounces,
-            .tail_max = quality.tolerance,
-            .threshold = profile.threshold,
-            .light_grid = quality.light_grid,
-            .per_set_passes = quality.per_set_passes};
-}
-
 void describeElements(const Scene& scene, PackData& pack) {
     for (const SceneLightSet& set : scene.light_sets)
         pack.elements.push_back({set.name, ElementKind::LightSet, set.max_weight});
@@ -124,6 +111,19 @@ void describePlaces(const Scene& scene, PackData& pack) {
 }
 
 }  // namespace
+
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
+    return {.series_rays = quality.series_rays,
+            .final_rays = quality.rays,
+            .emitter_samples = quality.emitter_samples,
+            .noise_max = quality.noise,
+            .denoise = quality.denoise != 0,
+            .bounces_max = quality.bounces,
+            .tail_max = quality.tolerance,
+            .threshold = profile.threshold,
+            .light_grid = quality.light_grid,
+            .per_set_passes = quality.per_set_passes};
+}
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
                              CookStats& stats) {

@@ -1,7 +1,7 @@
 // The whole cook: level in, pack out. main() and the tests call the same functions.
 #pragma once
 
-#include <bake/progress.h>
+#include <bake/bake.h>
 #include <pack/pack_data.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
@@ -38,6 +38,8 @@ struct CookStats {
 // Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats);
+
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality);
 
 struct CookResult {
     PackData pack;

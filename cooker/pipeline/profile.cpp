@@ -213,6 +213,14 @@ double shortDecimal(float value) {
 
 }  // namespace
 
+const char* nameOf(ColorFormat format) {
+    return color_formats[static_cast<size_t>(format)];
+}
+
+const char* nameOf(DirectionModel model) {
+    return direction_models[static_cast<size_t>(model)];
+}
+
 const Quality* Profile::quality(const std::string& name) const {
     if (name == "draft") return &draft;
     if (name == "preview") return &preview;
@@ -233,7 +241,7 @@ std::string Profile::settingsJson(const std::string& quality) const {
                 if constexpr (std::is_same_v<decltype(v), float*>)
                     setting["value"] = shortDecimal(*v);
                 else if constexpr (std::is_enum_v<std::remove_pointer_t<decltype(v)>>)
-                    setting["value"] = namesOf(*v)[static_cast<size_t>(*v)];
+                    setting["value"] = nameOf(*v);
                 else
                     setting["value"] = *v;
                 setting["from"] = from == origin.end() ? "default" : from->second;
@@ -241,6 +249,26 @@ std::string Profile::settingsJson(const std::string& quality) const {
             s.target);
     }
     return out.dump();
+}
+
+Expected<CookSettings> readSettings(const std::string& settings_json) {
+    const std::string source = "of the pack";
+    const auto root = parseObject({source, source, {}, settings_json});
+    if (!root) return std::unexpected(root.error());
+    CookSettings out;
+    const auto settings = settingsOf(out.profile);
+    for (const auto& [key, setting] : root->items()) {
+        if (!setting.is_object() || !setting.contains("value"))
+            return bad(source, fmt::format("'{}' has no value", key));
+        const json& value = setting["value"];
+        if (key == "quality" && value.is_string()) out.quality = value.get<std::string>();
+        const auto it = std::ranges::find(settings, key, &Setting::key);
+        if (it == settings.end()) continue;
+        if (auto ok = assign(*it, value, source); !ok) return std::unexpected(ok.error());
+    }
+    if (!out.profile.quality(out.quality))
+        return bad(source, "no quality is named; the pack was not cooked from a level");
+    return out;
 }
 
 Expected<Profile> loadProfile(const std::string& name_or_file) {

@@ -10,6 +10,10 @@
 
 namespace dimmer::cook {
 
+// As profiles name them: "e5b9g9r9", "ahd".
+const char* nameOf(ColorFormat format);
+const char* nameOf(DirectionModel model);
+
 struct Quality {
     uint32_t samples_per_texel = 4;     // points of a texel that rays start from
     uint32_t series_rays = 32;          // per texel, for the bounces
@@ -41,6 +45,13 @@ struct Profile {
     // Every setting as JSON: {"lightmaps.texels_per_metre": {"value": 4, "from": "desktop"}, ...}.
     std::string settingsJson(const std::string& quality) const;
 };
+
+// What settingsJson() wrote: the profile as far as it was used, and the name of the quality.
+struct CookSettings {
+    Profile profile;
+    std::string quality;
+};
+Expected<CookSettings> readSettings(const std::string& settings_json);
 
 // A shipped profile by name, or a file. A profile changes what it names of the one that it `extends` (a shipped one, or
 // a file beside it; "desktop" where it does not say). Unknown keys, wrong types and values out of range are errors that

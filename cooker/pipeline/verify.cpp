@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 #include <dimmer/cpu_runtime.h>
 #include <format/texel.h>
+#include <pipeline/dissect.h>
 
 #include <fmt/format.h>
 
@@ -19,9 +20,11 @@ constexpr double converged_share = 0.1;
 constexpr double first_relative = 0.02;
 constexpr uint32_t hidden_rays = 16;
 constexpr uint32_t tries_per_point = 20;
-// A set's light at a point is known well enough at this share of the light there and of the set's typical light.
+// A set's light at a point is known well enough at this share of the light there and of the set's typical light, with
+// the default limit of paths; more paths make it smaller, as they do the noise.
 constexpr double set_relative = 0.04;
-constexpr uint32_t set_paths_first = 256, set_paths_max = 4096;
+constexpr uint32_t set_paths_first = 256;
+constexpr uint32_t set_paths_share = 4;  // of what a point of the whole light may take
 // One set lights a part of the level: it takes more places to find it, most of which cost the first look alone.
 constexpr uint32_t set_points_factor = 4;
 
@@ -205,6 +208,24 @@ Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
                                                  scene.file));
 }
 
+Expected<void> dissect(const Scene& scene, const Pack& pack, const VerifyOptions& options, const ReferenceState& state,
+                       Progress& progress, VerifyReport& report) {
+    if (options.causes) {
+        if (std::ranges::find(state.door_open, true) != state.door_open.end())
+            return fail(ErrorCode::InvalidArgument, "Causes of error are told apart with closed doors only.");
+        const auto causes =
+            errorCauses(scene, pack, report.points, report.surface_pairs, state, report.floor_lux, progress);
+        if (!causes) return std::unexpected(causes.error());
+        report.causes.insert(causes->begin(), causes->end());
+    }
+    if (options.formats) {
+        auto formats = formatErrors(scene, pack, report.points, progress);
+        if (!formats) return std::unexpected(formats.error());
+        report.formats = std::move(*formats);
+    }
+    return {};
+}
+
 Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress,
                           VerifyReport& report) {
     // Each set is one that shines alone with every door closed: what the pack stores for it.
@@ -213,7 +234,7 @@ Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOpti
                                      set_points_factor * options.points, options.seed + 1);
     progress.stage("light sets", scene.light_sets.size() * 2 * points.size());
     for (uint32_t s = 0; s < scene.light_sets.size(); ++s) {
-        const auto effect = setEffect(closed, pack, points, s, options.seed, progress);
+        const auto effect = setEffect(closed, pack, points, s, options.seed, progress, options.paths_max);
         if (!effect) return std::unexpected(effect.error());
         SetReport set{scene.light_sets[s].name, *effect, 0};
         for (const Contribution& c : pack.contributions())
@@ -264,7 +285,7 @@ Expected<std::vector<double>> packLight(const Pack& pack, std::span<const Verify
 }
 
 Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::span<const VerifyPoint> points,
-                                  uint32_t set, uint32_t seed, Progress& progress) {
+                                  uint32_t set, uint32_t seed, Progress& progress, uint32_t paths_max) {
     const std::string name = pack.elements()[set].name;
     auto with = packLight(pack, points, false, fmt::format("all=0,{}=1", name));
     if (!with) return std::unexpected(with.error());
@@ -283,10 +304,13 @@ Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::s
         squares += p.reference_lux * p.reference_lux;
     }
     const double typical_lux = sum > 0 ? squares / sum : 0;
-    refineAll(
-        tracer, where,
-        {.paths_min = set_paths_first, .paths_max = set_paths_max, .relative = set_relative, .floor_lux = typical_lux},
-        estimates, progress);
+    const double more = static_cast<double>(paths_max) / VerifyOptions{}.paths_max;
+    refineAll(tracer, where,
+              {.paths_min = set_paths_first,
+               .paths_max = std::max(set_paths_first, paths_max / set_paths_share),
+               .relative = set_relative / std::sqrt(more),
+               .floor_lux = typical_lux},
+              estimates, progress);
     return effectError(pairsOf(*with, estimates));
 }
 
@@ -321,6 +345,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
     report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);
     report.causes["directional_model"] = modelError(at_surface, at_tilted, *floor_lux);
+    if (auto ok = dissect(scene, pack, options, *state, progress, report); !ok) return std::unexpected(ok.error());
     if (options.sets)
         if (auto ok = verifySets(scene, pack, options, progress, report); !ok) return std::unexpected(ok.error());
     progress.finish();

@@ -112,6 +112,49 @@ void addRecords(SynthRandom& random, PackData& pack) {
     for (TexelRecord& record : pack.base_pages) record = randomRecord(random);
 }
 
+ProbeRecord randomProbe(SynthRandom& random) {
+    ProbeRecord probe{.light = randomRecord(random).irradiance, .bands = {}};
+    for (uint32_t& word : probe.bands) word = static_cast<uint32_t>(random()) & 0x3f3f3f3fu;  // 0..63 of 127
+    return probe;
+}
+
+// Each cluster of texels has its share of the probes, with the same contributions.
+void addProbes(const SynthOptions& options, SynthRandom& random, PackData& pack) {
+    ProbeData& probes = pack.probes;
+    const double count = (options.level.local_probes + options.level.global_probes) * options.scale;
+    probes.base.resize(static_cast<size_t>(std::llround(count)));
+    for (ProbeRecord& probe : probes.base) probe = randomProbe(random);
+    probes.record_counts.assign(pack.contributions.size(), 0);
+    const double share = count / static_cast<double>(pack.base_pages.size());
+    double due = 0;
+    for (const Cluster& texels : pack.clusters) {
+        due += share * texels.receiver_count;
+        const auto receivers = static_cast<uint32_t>(due) - static_cast<uint32_t>(probes.numbers.size());
+        if (receivers == 0) continue;
+        Cluster cluster{.first_receiver = static_cast<uint32_t>(probes.numbers.size()),
+                        .receiver_count = receivers,
+                        .first_batch = static_cast<uint32_t>(probes.batches.size()),
+                        .batch_count = (receivers + batch_receivers_max - 1) / batch_receivers_max,
+                        .first_term = static_cast<uint32_t>(probes.terms.size()),
+                        .term_count = texels.term_count};
+        for (uint32_t first = 0; first < receivers; first += batch_receivers_max)
+            probes.batches.push_back(
+                {cluster.first_receiver + first, std::min(batch_receivers_max, receivers - first)});
+        for (uint32_t t = texels.first_term; t < texels.first_term + texels.term_count; ++t) {
+            uint32_t& records = probes.record_counts[pack.terms[t].contribution];
+            probes.terms.push_back({pack.terms[t].contribution, records});
+            records += receivers;
+        }
+        for (uint32_t i = 0; i < receivers; ++i) probes.numbers.push_back(cluster.first_receiver + i);
+        probes.clusters.push_back(cluster);
+    }
+    std::vector<uint32_t> first(1, 0);
+    for (const uint32_t records : probes.record_counts) first.push_back(first.back() + records);
+    for (ClusterTerm& term : probes.terms) term.first_record += first[term.contribution];
+    probes.payload.resize(first.back());
+    for (ProbeRecord& record : probes.payload) record = randomProbe(random);
+}
+
 std::string settingsOf(const SynthOptions& options) {
     const auto entry = [](const auto& value) {
         return nlohmann::ordered_json{{"value", value}, {"from", "command line"}};
@@ -120,6 +163,7 @@ std::string settingsOf(const SynthOptions& options) {
                                   {"synth.scale", entry(options.scale)},
                                   {"synth.clusters", entry(options.clusters)},
                                   {"synth.sets", entry(options.light_sets)},
+                                  {"synth.probes", entry(options.probes)},
                                   {"synth.seed", entry(options.seed)}}
         .dump();
 }
@@ -170,6 +214,7 @@ Expected<PackData> synthesise(const SynthOptions& options) {
     for (uint32_t i : byOverlap(members))
         if (!members[i].empty() && !addresses[i].empty()) addCluster(members[i], addresses[i], pack);
     addRecords(random, pack);
+    if (options.probes) addProbes(options, random, pack);
     pack.settings_json = settingsOf(options);
     return pack;
 }

@@ -40,6 +40,7 @@ class Writer {
             addArray(ChunkType::Payload, std::span(d_.payload).subspan(first, d_.contributions[k].receivers), k);
             first += d_.contributions[k].receivers;
         }
+        if (!d_.probes.base.empty()) addProbes(d_.probes);
         addTable(ChunkType::Meshes, [&](ByteWriter& out) { putMeshes(out); });
         addTable(ChunkType::Viewpoints, [&](ByteWriter& out) { putViewpoints(out); });
         addTable(ChunkType::Settings, [&](ByteWriter& out) { out.putString(d_.settings_json); });
@@ -68,6 +69,16 @@ class Writer {
     template <class T>
     void addArray(ChunkType type, std::span<const T> values, uint32_t subject = 0) {
         add(type, subject, std::as_bytes(values), sizeof(T));
+    }
+
+    void addProbes(const ProbeData& probes) {
+        addArray(ChunkType::ProbeBase, std::span(probes.base));
+        addArray(ChunkType::ProbeClusters, std::span(probes.clusters));
+        addArray(ChunkType::ProbeTerms, std::span(probes.terms));
+        addArray(ChunkType::ProbeBatches, std::span(probes.batches));
+        addArray(ChunkType::ProbeNumbers, std::span(probes.numbers));
+        addArray(ChunkType::ProbeCounts, std::span(probes.record_counts));
+        addArray(ChunkType::ProbePayload, std::span(probes.payload));
     }
 
     void addTable(ChunkType type, auto&& fill) {

@@ -26,6 +26,14 @@ enum class ChunkType : uint32_t {
     Batches = fourcc("BTCH"),
     Addresses = fourcc("ADDR"),
     Payload = fourcc("PAYL"),  // one per contribution; `subject` is its index
+    // Light probes: all of these or none.
+    ProbeBase = fourcc("PBAS"),
+    ProbeClusters = fourcc("PCLU"),
+    ProbeTerms = fourcc("PTRM"),
+    ProbeBatches = fourcc("PBTC"),
+    ProbeNumbers = fourcc("PNUM"),
+    ProbeCounts = fourcc("PCNT"),
+    ProbePayload = fourcc("PPAY"),
     Meshes = fourcc("MESH"),
     Viewpoints = fourcc("VIEW"),
     Settings = fourcc("SETT"),

@@ -170,19 +170,21 @@ struct TexelBlend {
         d1 += cl * static_cast<float>(static_cast<int>(d & 0xffc00u));
         d2 += cl * static_cast<float>(static_cast<int>(d & 0x3ff00000u));
     }
-    TexelRecord encode() const { return {encodeSum(), encodeMean()}; }
+    TexelRecord encode() const { return {encodeLight(r, g, b), encodeMean()}; }
 
-   private:
+    // A canonical record's channels as weights meet them.
     static std::array<float, 3> lift(uint32_t code) {
         if constexpr (format == ColorFormat::E5B9G9R9) return decodeE5B9G9R9(code);
         return {std::bit_cast<float>((code & 0x7ffu) << 17), std::bit_cast<float>(code << 6 & 0xffe0000u),
                 std::bit_cast<float>(code >> 4 & 0xffc0000u)};
     }
-    uint32_t encodeSum() const {
+    static uint32_t encodeLight(float r, float g, float b) {
         if constexpr (format == ColorFormat::E5B9G9R9) return encodeE5B9G9R9(r, g, b, blend_exponent);
         return encodeUfloat<6>(r, blend_exponent) | encodeUfloat<6>(g, blend_exponent) << 11 |
                encodeUfloat<5>(b, blend_exponent) << 22;
     }
+
+   private:
     uint32_t encodeMean() const {
         // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
         const bool usable = l >= blend_luminance_min && l <= blend_luminance_max;

@@ -70,6 +70,20 @@ bool hasTimelineSemaphores(VkPhysicalDevice device) {
     return features12.timelineSemaphore;
 }
 
+// A second queue for compute beside the one in `main`: of a family that does not draw, else another of the same family.
+struct ComputeQueue {
+    uint32_t family, index;
+};
+std::optional<ComputeQueue> findComputeQueue(VkPhysicalDevice device, uint32_t main) {
+    const auto families = queueFamilies(device);
+    for (uint32_t i = 0; i < families.size(); ++i)
+        if (i != main && (families[i].queueFlags & VK_QUEUE_COMPUTE_BIT) &&
+            !(families[i].queueFlags & VK_QUEUE_GRAPHICS_BIT))
+            return ComputeQueue{i, 0};
+    if (families[main].queueCount > 1) return ComputeQueue{main, 1};
+    return std::nullopt;
+}
+
 // Smaller is better.
 int preference(VkPhysicalDeviceType type) {
     switch (type) {
@@ -104,7 +118,7 @@ struct HeadlessDevice::Impl {
 
     Expected<void> createInstance(bool validation);
     Expected<void> choosePhysicalDevice(bool graphics);
-    Expected<void> createDevice();
+    Expected<void> createDevice(bool compute_queue);
 };
 
 Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
@@ -178,19 +192,30 @@ Expected<void> HeadlessDevice::Impl::choosePhysicalDevice(bool graphics) {
     return {};
 }
 
-Expected<void> HeadlessDevice::Impl::createDevice() {
-    const float priority = 1;
-    auto queue = vkStruct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
-    queue.queueFamilyIndex = vulkan.queue_family;
-    queue.queueCount = 1;
-    queue.pQueuePriorities = &priority;
+Expected<void> HeadlessDevice::Impl::createDevice(bool compute_queue) {
+    const float priorities[] = {1, 1};
+    std::optional<ComputeQueue> compute;
+    if (compute_queue) compute = findComputeQueue(vulkan.physical_device, vulkan.queue_family);
+    const bool same_family = compute && compute->family == vulkan.queue_family;
+    VkDeviceQueueCreateInfo queues[2];
+    for (VkDeviceQueueCreateInfo& queue : queues) {
+        queue = vkStruct<VkDeviceQueueCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO);
+        queue.queueFamilyIndex = vulkan.queue_family;
+        queue.queueCount = 1;
+        queue.pQueuePriorities = priorities;
+    }
+    if (same_family) queues[0].queueCount = 2;
+    if (compute) queues[1].queueFamilyIndex = compute->family;
     auto features = vkStruct<VkPhysicalDeviceVulkan12Features>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES);
     features.timelineSemaphore = VK_TRUE;
     auto info = vkStruct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
-    info.queueCreateInfoCount = 1;
-    info.pQueueCreateInfos = &queue;
+    info.queueCreateInfoCount = compute && !same_family ? 2 : 1;
+    info.pQueueCreateInfos = queues;
     DIMMER_VK(vkCreateDevice, vulkan.physical_device, &info, nullptr, &vulkan.device);
     vkGetDeviceQueue(vulkan.device, vulkan.queue_family, 0, &vulkan.queue);
+    if (!compute) return {};
+    vulkan.compute_queue_family = compute->family;
+    vkGetDeviceQueue(vulkan.device, compute->family, compute->index, &vulkan.compute_queue);
     return {};
 }
 
@@ -198,7 +223,7 @@ Expected<HeadlessDevice> HeadlessDevice::create(const HeadlessOptions& options) 
     auto impl = std::make_unique<Impl>();
     DIMMER_TRY(impl->createInstance(options.validation));
     DIMMER_TRY(impl->choosePhysicalDevice(options.graphics));
-    DIMMER_TRY(impl->createDevice());
+    DIMMER_TRY(impl->createDevice(options.compute_queue));
     return HeadlessDevice(std::move(impl));
 }
 

@@ -15,9 +15,12 @@ struct HeadlessOptions {
     bool validation = false;
     // The queue must draw as well as compute.
     bool graphics = false;
+    // Also ask for VulkanContext::compute_queue, where the device has a second queue to give. Whoever samples pages on
+    // the first queue then has to wait for the runtime's semaphore.
+    bool compute_queue = false;
 };
 
-// An instance, a device and one queue; a discrete GPU is preferred, then an integrated, a virtual and a software one.
+// An instance, a device, and one queue; a discrete GPU is preferred, then an integrated, a virtual and a software one.
 // Must outlive everything created from its context. Thread-safe where Vulkan is.
 class HeadlessDevice {
    public:

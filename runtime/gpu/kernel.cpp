@@ -2,6 +2,7 @@
 
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <update/device_places.h>
 
 #include <algorithm>
 #include <array>
@@ -29,10 +30,10 @@ Expected<ShaderModuleHandle> createModule(VkDevice device, std::span<const uint3
 
 Expected<Kernel> Kernel::create(VkDevice device, std::span<const uint32_t> spirv,
                                 std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
-                                std::span<const Specialisation> pipelines) {
+                                std::span<const Specialisation> pipelines, uint32_t set_count) {
     Kernel kernel;
-    DIMMER_TRY(kernel.createLayouts(device, bindings, push_constant_bytes));
-    DIMMER_TRY(kernel.createDescriptors(device, bindings));
+    DIMMER_TRY(kernel.createLayouts(device, bindings.first(bindings.size() / set_count), push_constant_bytes));
+    DIMMER_TRY(kernel.createDescriptors(device, bindings, set_count));
     DIMMER_TRY(kernel.createPipelines(device, spirv, pipelines));
     return kernel;
 }
@@ -62,31 +63,41 @@ Expected<void> Kernel::createLayouts(VkDevice device, std::span<const KernelBind
     return {};
 }
 
-Expected<void> Kernel::createDescriptors(VkDevice device, std::span<const KernelBinding> bindings) {
+Expected<void> Kernel::createDescriptors(VkDevice device, std::span<const KernelBinding> bindings, uint32_t set_count) {
     std::vector<VkDescriptorPoolSize> sizes;
     for (VkDescriptorType type : descriptor_types)
         if (const auto n = std::ranges::count(bindings, type, typeOf))
             sizes.push_back({type, static_cast<uint32_t>(n)});
     auto pool_info = vkStruct<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
-    pool_info.maxSets = 1;
+    pool_info.maxSets = set_count;
     pool_info.poolSizeCount = static_cast<uint32_t>(sizes.size());
     pool_info.pPoolSizes = sizes.data();
     VkDescriptorPool pool = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateDescriptorPool, device, &pool_info, nullptr, &pool);
     descriptor_pool_ = DescriptorPoolHandle(device, pool);
+    const size_t set_size = bindings.size() / set_count;
+    for (uint32_t i = 0; i < set_count; ++i) {
+        const auto set = createSet(device, bindings.subspan(i * set_size, set_size));
+        if (!set) return std::unexpected(set.error());
+        descriptors_.push_back(*set);
+    }
+    return {};
+}
 
+Expected<VkDescriptorSet> Kernel::createSet(VkDevice device, std::span<const KernelBinding> bindings) const {
     const VkDescriptorSetLayout set_layout = set_layout_.get();
     auto set_info = vkStruct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
-    set_info.descriptorPool = pool;
+    set_info.descriptorPool = descriptor_pool_.get();
     set_info.descriptorSetCount = 1;
     set_info.pSetLayouts = &set_layout;
-    DIMMER_VK(vkAllocateDescriptorSets, device, &set_info, &descriptors_);
+    VkDescriptorSet set = VK_NULL_HANDLE;
+    DIMMER_VK(vkAllocateDescriptorSets, device, &set_info, &set);
 
     for (uint32_t i = 0; i < bindings.size(); ++i) {
         const VkDescriptorBufferInfo buffer{bindings[i].buffer, 0, VK_WHOLE_SIZE};
         const VkDescriptorImageInfo image{VK_NULL_HANDLE, bindings[i].image, VK_IMAGE_LAYOUT_GENERAL};
         auto write = vkStruct<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
-        write.dstSet = descriptors_;
+        write.dstSet = set;
         write.dstBinding = i;
         write.descriptorCount = 1;
         write.descriptorType = typeOf(bindings[i]);
@@ -95,7 +106,7 @@ Expected<void> Kernel::createDescriptors(VkDevice device, std::span<const Kernel
         write.pImageInfo = &image;
         vkUpdateDescriptorSets(device, 1, &write, 0, nullptr);
     }
-    return {};
+    return set;
 }
 
 Expected<void> Kernel::createPipelines(VkDevice device, std::span<const uint32_t> spirv,
@@ -129,17 +140,16 @@ Expected<void> Kernel::createPipelines(VkDevice device, std::span<const uint32_t
     return {};
 }
 
-void Kernel::bind(VkCommandBuffer commands, size_t pipeline) const {
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_layout_.get(), 0, 1, &descriptors_, 0,
-                            nullptr);
+void Kernel::bind(VkCommandBuffer commands, size_t pipeline, uint32_t set) const {
+    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline_layout_.get(), 0, 1, &descriptors_[set],
+                            0, nullptr);
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[pipeline].get());
 }
 
 Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
                                         MemoryUse use) {
-    constexpr VkDeviceSize largest_texel_bytes = 16;
     TexelBuffer result;
-    auto buffer = createBuffer(vulkan, std::max(size_bytes, largest_texel_bytes),
+    auto buffer = createBuffer(vulkan, std::max<VkDeviceSize>(size_bytes, texel_buffer_bytes_min),
                                VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, use);
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     result.buffer = std::move(*buffer);

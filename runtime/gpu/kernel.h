@@ -26,11 +26,13 @@ using Specialisation = std::vector<uint32_t>;
 
 class Kernel {
    public:
+    // `bindings`: one list after another of as many, where there are several sets to choose from.
     static Expected<Kernel> create(VkDevice device, std::span<const uint32_t> spirv,
                                    std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
-                                   std::span<const Specialisation> pipelines);
+                                   std::span<const Specialisation> pipelines, uint32_t set_count = 1);
 
-    void bind(VkCommandBuffer commands, size_t pipeline) const;
+    void bind(VkCommandBuffer commands, size_t pipeline, uint32_t set = 0) const;
+    uint32_t pipelineCount() const { return static_cast<uint32_t>(pipelines_.size()); }
     template <class Constants>
     void push(VkCommandBuffer commands, const Constants& constants) const {
         vkCmdPushConstants(commands, pipeline_layout_.get(), VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof(constants),
@@ -40,14 +42,15 @@ class Kernel {
    private:
     Expected<void> createLayouts(VkDevice device, std::span<const KernelBinding> bindings,
                                  uint32_t push_constant_bytes);
-    Expected<void> createDescriptors(VkDevice device, std::span<const KernelBinding> bindings);
+    Expected<void> createDescriptors(VkDevice device, std::span<const KernelBinding> bindings, uint32_t set_count);
+    Expected<VkDescriptorSet> createSet(VkDevice device, std::span<const KernelBinding> bindings) const;
     Expected<void> createPipelines(VkDevice device, std::span<const uint32_t> spirv,
                                    std::span<const Specialisation> specialisations);
 
     SetLayoutHandle set_layout_;
     PipelineLayoutHandle pipeline_layout_;
     DescriptorPoolHandle descriptor_pool_;
-    VkDescriptorSet descriptors_ = VK_NULL_HANDLE;
+    std::vector<VkDescriptorSet> descriptors_;
     std::vector<PipelineHandle> pipelines_;
 };
 

@@ -160,8 +160,10 @@ LightmapImages LightmapPages::images() const {
             layers_};
 }
 
-LightmapPages::State LightmapPages::sampled() const {
-    return {VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL, sampling_stages_, VK_ACCESS_SHADER_READ_BIT};
+LightmapPages::State LightmapPages::sampled(bool drawing) const {
+    constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    const VkPipelineStageFlags stages = drawing ? sampling_stages_ : compute;
+    return {VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL, stages, VK_ACCESS_SHADER_READ_BIT};
 }
 
 void LightmapPages::transition(VkCommandBuffer commands, const State& from, const State& to) const {
@@ -184,12 +186,12 @@ namespace {
 constexpr VkPipelineStageFlags compute_stage = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 }
 
-void LightmapPages::beginWrites(VkCommandBuffer commands) const {
-    transition(commands, sampled(), {VK_IMAGE_LAYOUT_GENERAL, compute_stage, VK_ACCESS_SHADER_WRITE_BIT});
+void LightmapPages::beginWrites(VkCommandBuffer commands, bool drawing) const {
+    transition(commands, sampled(drawing), {VK_IMAGE_LAYOUT_GENERAL, compute_stage, VK_ACCESS_SHADER_WRITE_BIT});
 }
 
-void LightmapPages::endWrites(VkCommandBuffer commands) const {
-    transition(commands, {VK_IMAGE_LAYOUT_GENERAL, compute_stage, VK_ACCESS_SHADER_WRITE_BIT}, sampled());
+void LightmapPages::endWrites(VkCommandBuffer commands, bool drawing) const {
+    transition(commands, {VK_IMAGE_LAYOUT_GENERAL, compute_stage, VK_ACCESS_SHADER_WRITE_BIT}, sampled(drawing));
 }
 
 Expected<void> LightmapPages::forEachPiece(

@@ -12,13 +12,17 @@ class LightmapPages {
     static Expected<LightmapPages> create(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
 
     LightmapImages images() const;
+    // Where shaders sample what updates write.
+    VkPipelineStageFlags readers(bool drawing) const { return sampled(drawing).stages; }
+    uint64_t deviceBytes() const { return irradiance_.image.size_bytes + direction_.image.size_bytes; }
     VkImageView irradianceStorageView() const { return irradiance_.storage_view.get(); }
     VkImageView directionStorageView() const { return direction_.storage_view.get(); }
 
     // Around the dispatches that write pages. The first waits for what sampled them earlier on the queue, the second
-    // lets later commands sample.
-    void beginWrites(VkCommandBuffer commands) const;
-    void endWrites(VkCommandBuffer commands) const;
+    // lets later commands sample. `drawing`: false on a queue of its own, which may know no other stage than compute;
+    // between queues a semaphore does the rest.
+    void beginWrites(VkCommandBuffer commands, bool drawing) const;
+    void endWrites(VkCommandBuffer commands, bool drawing) const;
 
     // Blocking; both in the layout of CpuRuntime's pages.
     Expected<Runtime::Pages> read(Transfer& transfer) const;
@@ -37,7 +41,7 @@ class LightmapPages {
     Expected<PageArray> createArray(const VulkanContext& vulkan, VkFormat format) const;
     Expected<void> createSampler(const VulkanContext& vulkan);
     void transition(VkCommandBuffer commands, const State& from, const State& to) const;
-    State sampled() const;
+    State sampled(bool drawing = true) const;
     Expected<void> fill(const PackData& data, Transfer& transfer);
     // Calls copy(piece) for pieces of at most the staging buffer's size.
     Expected<void> forEachPiece(

@@ -46,6 +46,16 @@ Expected<MemoryHandle> allocate(const VulkanContext& vulkan, const VkMemoryRequi
     return MemoryHandle(vulkan.device, memory);
 }
 
+// Two families may use what both are named for; exclusive ownership would need transfers at every update.
+template <class Info>
+void share(const VulkanContext& vulkan, std::array<uint32_t, 2>& families, Info& info) {
+    families = {vulkan.queue_family, vulkan.compute_queue_family};
+    if (!vulkan.compute_queue || families[0] == families[1]) return;
+    info.sharingMode = VK_SHARING_MODE_CONCURRENT;
+    info.queueFamilyIndexCount = static_cast<uint32_t>(families.size());
+    info.pQueueFamilyIndices = families.data();
+}
+
 }  // namespace
 
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
@@ -55,6 +65,8 @@ Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_
     auto info = vkStruct<VkBufferCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO);
     info.size = size_bytes;
     info.usage = usage;
+    std::array<uint32_t, 2> families;
+    share(vulkan, families, info);
     VkBuffer buffer = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateBuffer, vulkan.device, &info, nullptr, &buffer);
     result.buffer = BufferHandle(vulkan.device, buffer);
@@ -73,8 +85,11 @@ Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_
     return result;
 }
 
-Expected<GpuImage> createImage(const VulkanContext& vulkan, const VkImageCreateInfo& info) {
+Expected<GpuImage> createImage(const VulkanContext& vulkan, VkImageCreateInfo info) {
     GpuImage result;
+    std::array<uint32_t, 2> families;
+    share(vulkan, families, info);
+    result.size_bytes = VkDeviceSize{4} * info.extent.width * info.extent.height * info.arrayLayers;
     VkImage image = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateImage, vulkan.device, &info, nullptr, &image);
     result.image = ImageHandle(vulkan.device, image);

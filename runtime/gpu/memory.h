@@ -18,6 +18,7 @@ struct GpuBuffer {
 struct GpuImage {
     MemoryHandle memory;
     ImageHandle image;
+    VkDeviceSize size_bytes = 0;  // of its texels, of 4 bytes; alignment is not counted
 };
 
 enum class MemoryUse {
@@ -26,8 +27,9 @@ enum class MemoryUse {
     Readback,  // written by the GPU, read by the host
 };
 
+// Both may be used on the context's queue and on its compute queue.
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
                                  MemoryUse memory);
-Expected<GpuImage> createImage(const VulkanContext& vulkan, const VkImageCreateInfo& info);
+Expected<GpuImage> createImage(const VulkanContext& vulkan, VkImageCreateInfo info);
 
 }  // namespace dimmer

@@ -102,7 +102,7 @@ Expected<GatherBlender> GatherBlender::create(const VulkanContext& vulkan, const
     return blender;
 }
 
-void GatherBlender::write(const Planner& planner) {
+void GatherBlender::write(const Planner& planner, uint32_t) {
     auto* weights = reinterpret_cast<WorkTerm*>(weights_.buffer.mapped);
     for (uint32_t k = 0; k < planner.contributionCount(); ++k) {
         const Weight& w = planner.plannedWeight(k);
@@ -110,11 +110,15 @@ void GatherBlender::write(const Planner& planner) {
     }
 }
 
-uint32_t GatherBlender::dispatch(VkCommandBuffer commands, const Planner&) const {
+uint32_t GatherBlender::dispatch(VkCommandBuffer commands, const Planner&, uint32_t) const {
     kernel_.bind(commands, 0);
     kernel_.push(commands, receivers_);
     dispatchRows(commands, (receivers_ + workgroup_size - 1) / workgroup_size, groups_x_max_);
     return 1;
+}
+
+uint64_t GatherBlender::deviceBytes() const {
+    return bytesOf({&addresses_, &base_, &payload_, &contributions_, &first_record_, &weights_});
 }
 
 Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, const PackData& data,
@@ -165,7 +169,11 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     return blender;
 }
 
-uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& planner) const {
+uint64_t ScatterBlender::deviceBytes() const {
+    return bytesOf({&addresses_, &base_, &payload_, &receivers_of_records_}) + sums_.size_bytes;
+}
+
+uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t) const {
     struct Constants {
         uint32_t count, first_record;
         float r, g, b;

@@ -12,8 +12,10 @@ class GatherBlender : public TexelExecutor {
    public:
     static Expected<GatherBlender> create(const VulkanContext& vulkan, const PackData& data, const LightmapPages& pages,
                                           Transfer& transfer);
-    void write(const Planner& planner) override;
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    void write(const Planner& planner, uint32_t page_set) override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
     TexelBuffer addresses_, base_, payload_, contributions_, first_record_, weights_;
@@ -27,8 +29,10 @@ class ScatterBlender : public TexelExecutor {
    public:
     static Expected<ScatterBlender> create(const VulkanContext& vulkan, const PackData& data,
                                            const LightmapPages& pages, Transfer& transfer);
-    void write(const Planner&) override {}  // weights are push constants
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    void write(const Planner&, uint32_t) override {}  // weights are push constants
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
     struct Part {

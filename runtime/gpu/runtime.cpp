@@ -1,12 +1,15 @@
 #include <dimmer/runtime.h>
 
 #include <gpu/lightmap_pages.h>
+#include <gpu/probe_blender.h>
+#include <gpu/record_loader.h>
 #include <gpu/texel_blender.h>
 #include <gpu/texel_executor.h>
 #include <gpu/update_timer.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <chrono>
 #include <limits>
 #include <optional>
@@ -36,11 +39,26 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
 
 }  // namespace
 
+// visit(k) for the contributions of a light set that are stored anywhere.
+template <class Visit>
+void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
+    for (uint32_t k = 0; k < data.contributions.size(); ++k)
+        if (data.contributions[k].light_set == set.element && data.contributions[k].receivers > 0) visit(k);
+}
+
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
     VulkanContext vulkan;
-    LightmapPages pages;
+    std::vector<LightmapPages> pages;         // one set, or two that take turns
+    uint32_t page_sets = 1;                   // as asked for
+    uint32_t front = 0;                       // the set to sample
+    uint32_t target = 0;                      // the set that the last plan writes
     std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
+    std::optional<ProbeBlender> probes;       // none when the pack has no probes that change
+    bool texels_planned = false, probes_planned = false;
+    std::optional<RecordLoader> loader;  // none in modes that load nothing later
+    std::vector<LightSet> loading;       // sets whose records are on their way
+    std::vector<RecordsState> records;   // per element
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
     SemaphoreHandle timeline;
@@ -50,34 +68,65 @@ struct Runtime::Impl {
 
     ~Impl() { (void)waitForSubmitted(); }
 
-    Expected<void> create(const PackData& data, const Planner& planner, const RuntimeOptions& options);
+    Expected<void> create(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                          const RuntimeOptions& options);
+    Expected<void> createExecutors(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                                   const RuntimeOptions& options, Transfer& transfer);
+    Expected<void> createPages(const PackData& data, uint32_t count, Transfer& transfer);
+    VkQueue ownQueue() const { return vulkan.compute_queue ? vulkan.compute_queue : vulkan.queue; }
+    uint32_t ownFamily() const { return vulkan.compute_queue ? vulkan.compute_queue_family : vulkan.queue_family; }
     Expected<void> waitForSubmitted() const;
-    void recordUpdate(VkCommandBuffer commands, const Planner& planner);
-    Expected<void> submitUpdate(const Planner& planner);
+    void recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner, bool drawing);
+    Expected<void> submitUpdate(const Planner& planner, const Planner* probe_planner, const SubmitWait& wait);
 };
 
-Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const RuntimeOptions& options) {
+Expected<void> Runtime::Impl::createExecutors(const PackData& data, const Planner& planner,
+                                              const Planner* probe_planner, const RuntimeOptions& options,
+                                              Transfer& transfer) {
+    if (!data.payload.empty()) {
+        auto made = createExecutor(vulkan, options, data, planner, pages, transfer);
+        if (!made) return std::unexpected(std::move(made.error()));
+        executor = std::move(*made);
+        if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
+    }
+    if (!probe_planner) return {};
+    auto made = ProbeBlender::create(vulkan, data, *probe_planner, static_cast<uint32_t>(pages.size()), transfer);
+    if (!made) return std::unexpected(std::move(made.error()));
+    probes = std::move(*made);
+    return {};
+}
+
+Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const Planner* probe_planner,
+                                     const RuntimeOptions& options) {
     auto transfer = Transfer::create(vulkan, MemoryUse::Upload);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
-    auto made_pages = LightmapPages::create(vulkan, data, *transfer);
-    if (!made_pages) return std::unexpected(std::move(made_pages.error()));
-    pages = std::move(*made_pages);
+    // What never changes needs no second set.
+    const bool changes = !data.payload.empty() || probe_planner;
+    const bool twice = options.buffering == Buffering::Double && changes;
+    DIMMER_TRY(createPages(data, twice ? 2 : 1, *transfer));
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
-    if (data.payload.empty()) return {};  // nothing can ever change
+    if (!changes) return {};
 
-    auto made_executor = createExecutor(vulkan, options.mode, data, planner, pages, *transfer);
-    if (!made_executor) return std::unexpected(std::move(made_executor.error()));
-    executor = std::move(*made_executor);
+    DIMMER_TRY(createExecutors(data, planner, probe_planner, options, *transfer));
     if (options.timestamps) {
         auto made_timer = UpdateTimer::create(vulkan);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
         timer = std::move(*made_timer);
     }
-    auto made_commands = createCommandBuffer(vulkan);
+    auto made_commands = createCommandBuffer(vulkan.device, ownFamily());
     if (!made_commands) return std::unexpected(std::move(made_commands.error()));
     own = std::move(*made_commands);
+    return {};
+}
+
+Expected<void> Runtime::Impl::createPages(const PackData& data, uint32_t count, Transfer& transfer) {
+    for (uint32_t i = 0; i < count; ++i) {
+        auto made = LightmapPages::create(vulkan, data, transfer);
+        if (!made) return std::unexpected(std::move(made.error()));
+        pages.push_back(std::move(*made));
+    }
     return {};
 }
 
@@ -92,22 +141,27 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
     return {};
 }
 
-void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner) {
-    executor->write(planner);
+void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner,
+                                 bool drawing) {
+    if (texels_planned) executor->write(planner, target);
+    if (probes_planned) probes->write(*probe_planner, target);
     if (timer) timer->reset(commands);
-    pages.beginWrites(commands);
+    if (texels_planned) pages[target].beginWrites(commands, drawing);
     if (timer) timer->begin(commands);
-    stats.dispatches = executor->dispatch(commands, planner);
+    if (texels_planned) stats.dispatches += executor->dispatch(commands, planner, target);
+    if (probes_planned)
+        stats.dispatches += probes->dispatch(commands, *probe_planner, target, pages[target].readers(drawing));
     if (timer) timer->end(commands);
-    pages.endWrites(commands);
+    if (texels_planned) pages[target].endWrites(commands, drawing);
     timed = timer.has_value();
 }
 
-Expected<void> Runtime::Impl::submitUpdate(const Planner& planner) {
+Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner* probe_planner,
+                                           const SubmitWait& wait) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, planner);
+    recordUpdate(own.commands, planner, probe_planner, vulkan.compute_queue == VK_NULL_HANDLE);
     DIMMER_VK(vkEndCommandBuffer, own.commands);
 
     const VkSemaphore semaphore = timeline.get();
@@ -115,12 +169,18 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner) {
     auto values = vkStruct<VkTimelineSemaphoreSubmitInfo>(VK_STRUCTURE_TYPE_TIMELINE_SEMAPHORE_SUBMIT_INFO);
     values.signalSemaphoreValueCount = 1;
     values.pSignalSemaphoreValues = &value;
+    values.waitSemaphoreValueCount = wait.semaphore ? 1 : 0;
+    values.pWaitSemaphoreValues = &wait.value;
     auto info = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO, &values);
     info.commandBufferCount = 1;
     info.pCommandBuffers = &own.commands;
     info.signalSemaphoreCount = 1;
     info.pSignalSemaphores = &semaphore;
-    DIMMER_VK(vkQueueSubmit, vulkan.queue, 1, &info, VK_NULL_HANDLE);
+    const VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    info.waitSemaphoreCount = wait.semaphore ? 1 : 0;
+    info.pWaitSemaphores = &wait.semaphore;
+    info.pWaitDstStageMask = &stages;
+    DIMMER_VK(vkQueueSubmit, ownQueue(), 1, &info, VK_NULL_HANDLE);
     submitted = value;
     return {};
 }
@@ -129,50 +189,93 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     DIMMER_TRY(checkContext(vulkan));
     auto impl = std::make_unique<Impl>();
     impl->vulkan = vulkan;
+    impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
+    impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
     Runtime runtime(pack, std::move(impl));
-    DIMMER_TRY(runtime.impl_->create(pack.data(), runtime.planner(), options));
+    DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(),
+                                     runtime.hasProbes() ? &runtime.probePlanner() : nullptr, options));
+    for (uint32_t i = 0; i < pack.elements().size() && !options.load_records; ++i)
+        if (pack.elements()[i].kind == ElementKind::LightSet) runtime.hold(LightSet{i}, true);
     return runtime;
 }
 
-Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl) : LightState(pack), impl_(std::move(impl)) {}
+Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl)
+    : LightState(pack, impl->page_sets), impl_(std::move(impl)) {}
 Runtime::~Runtime() = default;
 Runtime::Runtime(Runtime&&) noexcept = default;
 Runtime& Runtime::operator=(Runtime&&) noexcept = default;
 
+// Plans the next update of the pages that are to be written. False: there is nothing to execute.
+bool Runtime::planNext() {
+    Impl& impl = *impl_;
+    impl.timed = false;
+    impl.stats = {};
+    impl.texels_planned = impl.probes_planned = false;
+    const bool in_place = impl.pages.size() == 1;
+    impl.target = in_place ? 0 : impl.front ^ 1;
+    Planner& next = planner(impl.target);
+    if (!in_place && next.waiting()) {
+        impl.texels_planned = next.planWaiting();  // of one state to its end: pages are shown when they are complete
+    } else {
+        const bool current = planner(impl.front).upToDate() && (!hasProbes() || probePlanner(impl.front).upToDate());
+        if (!in_place && current) return false;
+        impl.texels_planned = next.plan();
+        impl.probes_planned = hasProbes() && probePlanner(impl.target).plan();
+    }
+    impl.stats = next.stats();
+    if (impl.probes_planned) addProbes(probePlanner(impl.target).stats(), impl.stats);
+    const bool any = impl.texels_planned || impl.probes_planned;
+    // The other pages may hold the state already, when it is one of before.
+    if (!any) impl.front = impl.target;
+    return any;
+}
+
+// What was planned cannot be carried out.
+void Runtime::rollback() {
+    if (impl_->texels_planned) planner(impl_->target).rollback();
+    if (impl_->probes_planned) probePlanner(impl_->target).rollback();
+    impl_->timed = false;
+}
+
+const Planner* Runtime::plannedProbes() const {
+    return impl_->probes_planned ? &probePlanner(impl_->target) : nullptr;
+}
+
+// What was planned has been sent or recorded.
+void Runtime::finish(double host_us) {
+    impl_->stats.host_us = host_us;
+    if (!planner(impl_->target).waiting()) impl_->front = impl_->target;
+}
+
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
     const auto start = std::chrono::steady_clock::now();
-    const bool any = planner().plan();
-    impl_->stats = planner().stats();
-    impl_->timed = false;
-    if (any) {
+    if (planNext()) {
         // An update that submit() sent may still be reading the work list.
         if (auto done = impl_->waitForSubmitted(); !done) {
-            planner().rollback();
+            rollback();
             return std::unexpected(std::move(done.error()));
         }
-        impl_->recordUpdate(commands, planner());
+        impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
+        finish(0);
     }
     impl_->stats.host_us = microsecondsSince(start);
     return impl_->stats;
 }
 
-Expected<UpdateStats> Runtime::submit() {
+Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     auto start = std::chrono::steady_clock::now();
-    const bool any = planner().plan();
-    impl_->stats = planner().stats();
-    impl_->timed = false;
-    impl_->stats.host_us = microsecondsSince(start);
+    const bool any = planNext();
+    const double planning_us = impl_->stats.host_us = microsecondsSince(start);
     if (!any) return impl_->stats;
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
-    if (sent) sent = impl_->submitUpdate(planner());
+    if (sent) sent = impl_->submitUpdate(planner(impl_->target), plannedProbes(), wait);
     if (!sent) {
-        planner().rollback();
-        impl_->timed = false;
+        rollback();
         return std::unexpected(std::move(sent.error()));
     }
-    impl_->stats.host_us += microsecondsSince(start);
+    finish(planning_us + microsecondsSince(start));
     return impl_->stats;
 }
 
@@ -196,14 +299,105 @@ Expected<UpdateStats> Runtime::wait() {
     return impl_->stats;
 }
 
-LightmapImages Runtime::images() const {
-    return impl_->pages.images();
+Expected<void> Runtime::checkLoadable(LightSet set) const {
+    DIMMER_TRY(checkSet(set));
+    if (impl_->executor && !impl_->executor->records())
+        return fail(ErrorCode::Unsupported, "Modes gather and scatter keep all records loaded.");
+    return {};
+}
+
+Expected<void> Runtime::dropRecords(LightSet set) {
+    DIMMER_TRY(checkLoadable(set));
+    hold(set, true);
+    impl_->records[set.element] = RecordsState::Dropped;
+    std::erase_if(impl_->loading, [&](LightSet other) { return other.element == set.element; });
+    forEachContribution(pack().data(), set, [&](uint32_t k) {
+        impl_->loader->cancel(k);
+        impl_->executor->records()->release(k);
+    });
+    return {};
+}
+
+Expected<void> Runtime::loadRecords(LightSet set) {
+    DIMMER_TRY(checkLoadable(set));
+    if (impl_->records[set.element] != RecordsState::Dropped) return {};
+    Expected<void> room;
+    forEachContribution(pack().data(), set, [&](uint32_t k) {
+        if (room) room = impl_->executor->records()->reserve(k);
+    });
+    if (!room) {
+        forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->executor->records()->release(k); });
+        return room;
+    }
+    forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->loader->add(k, *impl_->executor->records()); });
+    impl_->records[set.element] = RecordsState::Loading;
+    impl_->loading.push_back(set);
+    return {};
+}
+
+RecordsState Runtime::recordsState(LightSet set) const {
+    return checkSet(set) ? impl_->records[set.element] : RecordsState::Dropped;
+}
+
+// Sets of which nothing is on its way any more.
+void Runtime::finishLoading() {
+    std::erase_if(impl_->loading, [&](LightSet set) {
+        bool pending = false;
+        forEachContribution(pack().data(), set, [&](uint32_t k) { pending |= impl_->loader->pending(k); });
+        if (pending) return false;
+        impl_->records[set.element] = RecordsState::Loaded;
+        hold(set, false);
+        return true;
+    });
+}
+
+Expected<LoadProgress> Runtime::continueLoading(uint64_t bytes_max) {
+    if (!impl_->loader) {  // nothing is stored of any set
+        finishLoading();
+        return LoadProgress{};
+    }
+    DIMMER_TRY(impl_->loader->step(*impl_->executor->records(), bytes_max));
+    finishLoading();
+    return impl_->loader->progress();
+}
+
+LightmapImages Runtime::images(uint32_t page_set) const {
+    return impl_->pages[std::min<size_t>(page_set, impl_->pages.size() - 1)].images();
+}
+uint32_t Runtime::pageSet() const {
+    return impl_->front;
+}
+
+VkBuffer Runtime::probes(uint32_t page_set) const {
+    if (!impl_->probes) return VK_NULL_HANDLE;
+    return impl_->probes->probes(std::min(page_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+}
+
+DeviceFootprint Runtime::footprint() const {
+    DeviceFootprint footprint;
+    for (const LightmapPages& pages : impl_->pages) footprint.bytes += pages.deviceBytes();
+    if (impl_->executor) {
+        footprint.bytes += impl_->executor->deviceBytes();
+        if (impl_->loader) footprint.bytes += impl_->loader->deviceBytes();
+        footprint.pipelines = impl_->executor->pipelineCount();
+    }
+    if (impl_->probes) {
+        footprint.bytes += impl_->probes->deviceBytes();
+        footprint.pipelines += impl_->probes->pipelineCount();
+    }
+    return footprint;
 }
 
 Expected<Runtime::Pages> Runtime::readPages() {
+    DIMMER_TRY(impl_->waitForSubmitted());  // perhaps on another queue
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
-    return impl_->pages.read(*transfer);
+    auto pages = impl_->pages[impl_->front].read(*transfer);
+    if (!pages || !impl_->probes) return pages;
+    auto probes = impl_->probes->read(impl_->front, *transfer);
+    if (!probes) return std::unexpected(std::move(probes.error()));
+    pages->probes = std::move(*probes);
+    return pages;
 }
 
 }  // namespace dimmer

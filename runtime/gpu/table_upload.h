@@ -6,6 +6,7 @@
 #include <gpu/transfer.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <vector>
 
 namespace dimmer {
@@ -41,6 +42,12 @@ inline Expected<TexelBuffer> uploadTable(const VulkanContext& vulkan, Transfer& 
     if (auto ok = transfer.upload(table->buffer.buffer.get(), size_bytes, fill); !ok)
         return std::unexpected(std::move(ok.error()));
     return table;
+}
+
+inline uint64_t bytesOf(std::initializer_list<const TexelBuffer*> tables) {
+    uint64_t sum = 0;
+    for (const TexelBuffer* table : tables) sum += table->buffer.size_bytes;
+    return sum;
 }
 
 // A whole vector as it is.

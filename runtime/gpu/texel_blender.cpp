@@ -4,6 +4,7 @@
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
 #include <spirv/blend_texels_comp.h>
+#include <update/device_places.h>
 
 #include <algorithm>
 #include <cstring>
@@ -22,52 +23,12 @@ struct DispatchConstants {
     uint32_t first_item, item_count;
 };
 
-// A lane loads two receivers at once, so every cluster starts at an even place, in receivers and in records.
-constexpr uint32_t padded(uint32_t receivers) {
-    return (receivers + 1) / 2 * 2;
-}
-
-// Where the device keeps what batches read: the pack's order, with gaps.
-struct Places {
-    std::vector<BatchPlace> batches;
-    std::vector<uint32_t> first_records;  // per cluster, of each of its contributions
-    uint32_t receivers = 0;
-    uint64_t records = 0;
-};
-
-Places placesOf(const PackData& data) {
-    std::vector<uint64_t> next(data.contributions.size() + 1, 0);
-    for (const Cluster& cluster : data.clusters)
-        for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
-            next[data.terms[t].contribution + 1] += padded(cluster.receiver_count);
-    for (size_t k = 1; k < next.size(); ++k) next[k] += next[k - 1];
-
-    Places places;
-    places.records = next.back();
-    for (const Cluster& cluster : data.clusters) {
-        const auto first_record = static_cast<uint32_t>(places.first_records.size());
-        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b) {
-            const uint32_t offset = data.batches[b].first_receiver - cluster.first_receiver;
-            places.batches.push_back({places.receivers + offset, data.batches[b].receiver_count, offset, first_record});
-        }
-        places.receivers += padded(cluster.receiver_count);
-        for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
-            uint64_t& first = next[data.terms[t].contribution];
-            places.first_records.push_back(static_cast<uint32_t>(first));
-            first += padded(cluster.receiver_count);
-        }
-    }
-    return places;
-}
-
-Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const Places& places, const Planner& planner) {
+Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places, const Planner& planner) {
     const uint64_t payload_bytes = places.records * sizeof(TexelRecord);
     const uint64_t base_bytes = uint64_t{places.receivers} * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
     const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
-    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max &&
-        places.first_records.size() <= limits.maxTexelBufferElements)
-        return {};
+    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
     return fail(ErrorCode::Unsupported,
                 fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
                             "exceeds what this Vulkan device reads as one texel buffer, {} bytes. Cook with fewer "
@@ -75,7 +36,7 @@ Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const Places& p
                             payload_bytes, base_bytes, work_bytes, bytes_max));
 }
 
-std::vector<Run> receiverRuns(const PackData& data, const Places& places) {
+std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) {
     std::vector<Run> runs;
     for (const Cluster& cluster : data.clusters)
         runs.push_back(
@@ -83,19 +44,15 @@ std::vector<Run> receiverRuns(const PackData& data, const Places& places) {
     return runs;
 }
 
-std::vector<Run> recordRuns(const PackData& data, const Places& places) {
-    std::vector<Run> runs;
-    for (const Cluster& cluster : data.clusters)
-        for (uint32_t t = 0; t < cluster.term_count; ++t)
-            runs.push_back({places.first_records[places.batches[cluster.first_batch].first_record + t],
-                            data.terms[cluster.first_term + t].first_record, cluster.receiver_count});
-    std::ranges::sort(runs, {}, &Run::to);
-    return runs;
-}
-
 Specialisation specialisationOf(uint32_t group, ColorFormat format) {
     return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
             static_cast<uint32_t>(format)};
+}
+
+Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
+    if (!made) return std::unexpected(std::move(made.error()));
+    slot = std::move(*made);
+    return {};
 }
 
 // Pairs of receivers must not straddle batches.
@@ -112,73 +69,98 @@ Expected<void> checkBatches(const PackData& data) {
 }  // namespace
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                            const LightmapPages& pages, Transfer& transfer, bool per_combination) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    TexelBlender blender;
-    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
-    blender.per_combination_ = per_combination;
-    DIMMER_TRY(blender.createTables(vulkan, data, planner, transfer));
-    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, pages));
-    return blender;
-}
-
-Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                          Transfer& transfer) {
-    auto keep = [](Expected<TexelBuffer> made, TexelBuffer& slot) -> Expected<void> {
-        if (!made) return std::unexpected(std::move(made.error()));
-        slot = std::move(*made);
-        return {};
-    };
+                                            std::span<const LightmapPages> page_sets, Transfer& transfer,
+                                            const RuntimeOptions& options) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     DIMMER_TRY(checkBatches(data));
-    const Places places = placesOf(data);
-    DIMMER_TRY(checkLimits(properties.limits, places, planner));
+    DIMMER_TRY(checkLimits(properties.limits, placesOf(data), planner));
+    TexelBlender blender;
+    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    blender.per_combination_ = options.mode == UpdateMode::PerCombination;
+    auto records = RecordStore::create(vulkan, data, options.records_bytes_max);
+    if (!records) return std::unexpected(std::move(records.error()));
+    blender.records_ = std::move(*records);
+    DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
+    DIMMER_TRY(blender.createTables(vulkan, data, transfer));
+    for (size_t i = 0; i < page_sets.size(); ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
+    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, page_sets));
+    return blender;
+}
 
-    const auto receivers = receiverRuns(data, places), records = recordRuns(data, places);
+Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
+    const DevicePlaces places = placesOf(data);
+    const auto receivers = receiverRuns(data, places);
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(uint32_t), address_format,
                                 fillFrom(receivers, [&](uint32_t i) { return data.addresses[i]; })),
                     addresses_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),
                     base_));
-    DIMMER_TRY(
-        keep(uploadTable(vulkan, transfer, places.records * sizeof(TexelRecord), wide_format,
-                         fillFrom(records, [&](uint32_t i) { return canonical(data.color_format, data.payload[i]); })),
-             payload_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.first_records, VK_FORMAT_R32_UINT), first_records_));
-    DIMMER_TRY(
-        keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload), work_));
-    return keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-                terms_);
+    return keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_);
+}
+
+// Of every contribution, or of those without a light set, which nothing can load later.
+Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& transfer, bool all) {
+    for (uint32_t k = 0; k < data.contributions.size(); ++k) {
+        if (!all && data.contributions[k].light_set) continue;
+        DIMMER_TRY(records_.reserve(k));
+        DIMMER_TRY(transfer.upload(
+            records_.buffer(), records_.byteCount(k),
+            [&](VkDeviceSize offset, std::span<std::byte> piece) { records_.fill(k, offset, piece); },
+            records_.firstByte(k)));
+    }
+    return {};
+}
+
+Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
+    Work work;
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
+                    work.items));
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
+                    work.terms));
+    work_.push_back(std::move(work));
+    return {};
 }
 
 Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
-                                          const LightmapPages& pages) {
+                                          std::span<const LightmapPages> page_sets) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
         pipelines.push_back(specialisationOf(group, format));
-    const KernelBinding bindings[] = {
-        KernelBinding::ofTexels(addresses_.view.get()),       KernelBinding::ofTexels(base_.view.get()),
-        KernelBinding::ofTexels(payload_.view.get()),         KernelBinding::ofTexels(work_.view.get()),
-        KernelBinding::ofTexels(terms_.view.get()),           KernelBinding::ofTexels(places_.view.get()),
-        KernelBinding::ofTexels(first_records_.view.get()),   KernelBinding::ofImage(pages.irradianceStorageView()),
-        KernelBinding::ofImage(pages.directionStorageView()),
-    };
-    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchConstants), pipelines);
+    std::vector<KernelBinding> bindings;
+    for (size_t i = 0; i < page_sets.size(); ++i)
+        bindings.insert(bindings.end(), {
+                                            KernelBinding::ofTexels(addresses_.view.get()),
+                                            KernelBinding::ofTexels(base_.view.get()),
+                                            KernelBinding::ofTexels(records_.view()),
+                                            KernelBinding::ofTexels(work_[i].items.view.get()),
+                                            KernelBinding::ofTexels(work_[i].terms.view.get()),
+                                            KernelBinding::ofTexels(places_.view.get()),
+                                            KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
+                                            KernelBinding::ofImage(page_sets[i].directionStorageView()),
+                                        });
+    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchConstants), pipelines,
+                                 static_cast<uint32_t>(page_sets.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
 }
 
-void TexelBlender::write(const Planner& planner) {
+uint64_t TexelBlender::deviceBytes() const {
+    uint64_t bytes = bytesOf({&addresses_, &base_, &places_}) + records_.deviceBytes();
+    for (const Work& work : work_) bytes += bytesOf({&work.items, &work.terms});
+    return bytes;
+}
+
+void TexelBlender::write(const Planner& planner, uint32_t page_set) {
     const WorkList& work = planner.work();
-    std::memcpy(work_.buffer.mapped, work.items.data(), work.items.size_bytes());
-    // Everything may be off: an empty span's data is not for memcpy.
-    if (!work.terms.empty()) std::memcpy(terms_.buffer.mapped, work.terms.data(), work.terms.size_bytes());
+    const Work& target = work_[page_set];
+    std::memcpy(target.items.buffer.mapped, work.items.data(), work.items.size_bytes());
+    auto* terms = reinterpret_cast<WorkTerm*>(target.terms.buffer.mapped);
+    for (const WorkTerm& term : work.terms)
+        *terms++ = {records_.firstRecord(term.term), term.weight_r, term.weight_g, term.weight_b};
 }
 
 void TexelBlender::recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const {
@@ -203,12 +185,12 @@ uint32_t TexelBlender::dispatchGroup(VkCommandBuffer commands, const WorkList& w
     return dispatches;
 }
 
-uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner) const {
+uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const {
     const WorkList& work = planner.work();
     uint32_t dispatches = 0;
     for (uint32_t i = 0; i < work_group_count; ++i) {
         if (work.groups[i].item_count == 0) continue;
-        kernel_.bind(commands, i);
+        kernel_.bind(commands, i, page_set);
         dispatches += dispatchGroup(commands, work, work.groups[i]);
     }
     return dispatches;

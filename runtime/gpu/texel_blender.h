@@ -1,7 +1,7 @@
 // The kernel shaders/blend_texels.comp with its buffers: executes work lists on lightmap pages.
 #pragma once
 
-#include <gpu/kernel.h>
+#include <gpu/record_store.h>
 #include <gpu/texel_executor.h>
 
 #include <array>
@@ -13,20 +13,32 @@ class TexelBlender : public TexelExecutor {
     // Uploads addresses, base and payload (blocking), and makes one pipeline per group of work that clusters can fall
     // into. Unsupported where the device's limits are too small for the pack.
     static Expected<TexelBlender> create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                         const LightmapPages& pages, Transfer& transfer, bool per_combination);
+                                         std::span<const LightmapPages> page_sets, Transfer& transfer,
+                                         const RuntimeOptions& options);
 
-    void write(const Planner& planner) override;
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const override;
+    void write(const Planner& planner, uint32_t page_set) override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    uint64_t deviceBytes() const override;
+    uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
+    RecordStore* records() override { return &records_; }
 
    private:
-    Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                Transfer& transfer);
+    // Written anew by the host for every update of a set of pages.
+    struct Work {
+        TexelBuffer items, terms;
+    };
+
+    Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
+    Expected<void> uploadRecords(const PackData& data, Transfer& transfer, bool all);
+    Expected<void> createWork(const VulkanContext& vulkan, const Planner& planner);
     Expected<void> createKernel(VkDevice device, ColorFormat format, const Planner& planner,
-                                const LightmapPages& pages);
+                                std::span<const LightmapPages> page_sets);
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 
-    TexelBuffer addresses_, base_, payload_, work_, terms_, places_, first_records_;
+    TexelBuffer addresses_, base_, places_;
+    RecordStore records_;
+    std::vector<Work> work_;  // per set of pages
     Kernel kernel_;
     uint32_t groups_x_max_ = 0;
     bool per_combination_ = false;  // a dispatch per cluster, as UBERBAKE's section 3.3 describes

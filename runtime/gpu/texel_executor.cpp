@@ -14,19 +14,22 @@ Expected<std::unique_ptr<TexelExecutor>> boxed(Expected<T> made) {
 
 }  // namespace
 
-Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, UpdateMode mode,
+Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, const RuntimeOptions& options,
                                                         const PackData& data, const Planner& planner,
-                                                        const LightmapPages& pages, Transfer& transfer) {
-    switch (mode) {
+                                                        std::span<const LightmapPages> page_sets, Transfer& transfer) {
+    const bool compares = options.mode == UpdateMode::Gather || options.mode == UpdateMode::Scatter;
+    if (compares && (page_sets.size() > 1 || !options.load_records || options.records_bytes_max > 0))
+        return fail(ErrorCode::Unsupported, "Modes gather and scatter update pages in place, with all records loaded.");
+    switch (options.mode) {
         case UpdateMode::Gather:
-            return boxed(GatherBlender::create(vulkan, data, pages, transfer));
+            return boxed(GatherBlender::create(vulkan, data, page_sets.front(), transfer));
         case UpdateMode::Scatter:
-            return boxed(ScatterBlender::create(vulkan, data, pages, transfer));
+            return boxed(ScatterBlender::create(vulkan, data, page_sets.front(), transfer));
         case UpdateMode::WorkList:
         case UpdateMode::PerCombination:
             break;
     }
-    return boxed(TexelBlender::create(vulkan, data, planner, pages, transfer, mode == UpdateMode::PerCombination));
+    return boxed(TexelBlender::create(vulkan, data, planner, page_sets, transfer, options));
 }
 
 }  // namespace dimmer

@@ -5,22 +5,32 @@
 #include <update/planner.h>
 
 #include <memory>
+#include <span>
 
 namespace dimmer {
+
+class RecordStore;
 
 class TexelExecutor {
    public:
     virtual ~TexelExecutor() = default;
 
-    // Copies the plan to the device's view of it: the dispatches of the previous one must have completed.
-    virtual void write(const Planner& planner) = 0;
+    // Copies the plan to the device's view of it: the dispatches of the previous one for these pages must have
+    // completed.
+    virtual void write(const Planner& planner, uint32_t page_set) = 0;
     // Records the dispatches, without barriers around them. Returns their number.
-    virtual uint32_t dispatch(VkCommandBuffer commands, const Planner& planner) const = 0;
+    virtual uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const = 0;
+
+    virtual uint64_t deviceBytes() const = 0;
+    virtual uint32_t pipelineCount() const = 0;
+    // Whose ranges may be loaded and dropped; null in modes that keep records in an order of their own.
+    virtual RecordStore* records() { return nullptr; }
 };
 
-// Uploads what the mode needs (blocking). Unsupported where the device's limits are too small for the pack.
-Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, UpdateMode mode,
+// Uploads what the mode needs (blocking), to write any of the given sets of pages. Unsupported where the device's
+// limits are too small for the pack, and for several sets in modes that are there to compare with.
+Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, const RuntimeOptions& options,
                                                         const PackData& data, const Planner& planner,
-                                                        const LightmapPages& pages, Transfer& transfer);
+                                                        std::span<const LightmapPages> page_sets, Transfer& transfer);
 
 }  // namespace dimmer

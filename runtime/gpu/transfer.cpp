@@ -8,20 +8,20 @@
 
 namespace dimmer {
 
-Expected<CommandBuffer> createCommandBuffer(const VulkanContext& vulkan) {
+Expected<CommandBuffer> createCommandBuffer(VkDevice device, uint32_t queue_family) {
     CommandBuffer result;
     auto pool_info = vkStruct<VkCommandPoolCreateInfo>(VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO);
     pool_info.flags = VK_COMMAND_POOL_CREATE_RESET_COMMAND_BUFFER_BIT | VK_COMMAND_POOL_CREATE_TRANSIENT_BIT;
-    pool_info.queueFamilyIndex = vulkan.queue_family;
+    pool_info.queueFamilyIndex = queue_family;
     VkCommandPool pool = VK_NULL_HANDLE;
-    DIMMER_VK(vkCreateCommandPool, vulkan.device, &pool_info, nullptr, &pool);
-    result.pool = CommandPoolHandle(vulkan.device, pool);
+    DIMMER_VK(vkCreateCommandPool, device, &pool_info, nullptr, &pool);
+    result.pool = CommandPoolHandle(device, pool);
 
     auto info = vkStruct<VkCommandBufferAllocateInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO);
     info.commandPool = pool;
     info.level = VK_COMMAND_BUFFER_LEVEL_PRIMARY;
     info.commandBufferCount = 1;
-    DIMMER_VK(vkAllocateCommandBuffers, vulkan.device, &info, &result.commands);
+    DIMMER_VK(vkAllocateCommandBuffers, device, &info, &result.commands);
     return result;
 }
 
@@ -34,7 +34,7 @@ Expected<Transfer> Transfer::create(const VulkanContext& vulkan, MemoryUse use) 
     if (!staging) return std::unexpected(std::move(staging.error()));
     transfer.staging_ = std::move(*staging);
 
-    auto commands = createCommandBuffer(vulkan);
+    auto commands = createCommandBuffer(vulkan.device, vulkan.queue_family);
     if (!commands) return std::unexpected(std::move(commands.error()));
     transfer.pool_ = std::move(commands->pool);
     transfer.commands_ = commands->commands;
@@ -64,12 +64,13 @@ Expected<void> Transfer::run(const std::function<void(VkCommandBuffer)>& record)
 }
 
 Expected<void> Transfer::upload(VkBuffer target, VkDeviceSize size_bytes,
-                                const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill) {
+                                const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill,
+                                VkDeviceSize target_offset) {
     for (VkDeviceSize offset = 0; offset < size_bytes; offset += staging_bytes) {
         const VkDeviceSize piece_bytes = std::min(staging_bytes, size_bytes - offset);
         fill(offset, std::span(staging_.mapped, piece_bytes));
         DIMMER_TRY(run([&](VkCommandBuffer commands) {
-            const VkBufferCopy region{.srcOffset = 0, .dstOffset = offset, .size = piece_bytes};
+            const VkBufferCopy region{.srcOffset = 0, .dstOffset = target_offset + offset, .size = piece_bytes};
             vkCmdCopyBuffer(commands, staging_.buffer.get(), target, 1, &region);
             // To whatever later submissions of any kind read.
             auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);

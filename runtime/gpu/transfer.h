@@ -17,10 +17,11 @@ class Transfer {
 
     // Records commands, submits them and blocks until they are done.
     Expected<void> run(const std::function<void(VkCommandBuffer)>& record);
-    // Fills `target` from its start; fill(offset, piece) writes the piece that begins `offset` bytes into it. Pieces
-    // are multiples of 8 bytes when size_bytes is.
+    // Fills `target` from `target_offset` on; fill(offset, piece) writes the piece that begins `offset` bytes further.
+    // Pieces are multiples of 8 bytes when size_bytes is.
     Expected<void> upload(VkBuffer target, VkDeviceSize size_bytes,
-                          const std::function<void(VkDeviceSize offset, std::span<std::byte> piece)>& fill);
+                          const std::function<void(VkDeviceSize offset, std::span<std::byte> piece)>& fill,
+                          VkDeviceSize target_offset = 0);
 
     const GpuBuffer& staging() const { return staging_; }
 
@@ -37,6 +38,6 @@ struct CommandBuffer {
     CommandPoolHandle pool;
     VkCommandBuffer commands = VK_NULL_HANDLE;
 };
-Expected<CommandBuffer> createCommandBuffer(const VulkanContext& vulkan);
+Expected<CommandBuffer> createCommandBuffer(VkDevice device, uint32_t queue_family);
 
 }  // namespace dimmer

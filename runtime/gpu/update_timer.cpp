@@ -3,6 +3,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <vector>
 
 namespace dimmer {
@@ -12,7 +13,8 @@ Expected<std::optional<UpdateTimer>> UpdateTimer::create(const VulkanContext& vu
     vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, nullptr);
     std::vector<VkQueueFamilyProperties> families(count);
     vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, families.data());
-    const uint32_t bits = families[vulkan.queue_family].timestampValidBits;
+    uint32_t bits = families[vulkan.queue_family].timestampValidBits;
+    if (vulkan.compute_queue) bits = std::min(bits, families[vulkan.compute_queue_family].timestampValidBits);
     if (bits == 0) return std::nullopt;
 
     VkPhysicalDeviceProperties properties;

@@ -3,7 +3,9 @@
 
 #include <dimmer/pack.h>
 
+#include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -16,6 +18,14 @@ struct TexelRecord {
     bool operator==(const TexelRecord&) const = default;
 };
 static_assert(sizeof(TexelRecord) == 8);
+
+// A stored light probe; see runtime/format/probe.h.
+struct ProbeRecord {
+    uint32_t light = 0;                  // band 0, in the pack's ColorFormat
+    std::array<uint32_t, 6> bands = {};  // bands 1 and 2, 24 signed bytes
+    bool operator==(const ProbeRecord&) const = default;
+};
+static_assert(sizeof(ProbeRecord) == 28);
 
 // One contribution of a cluster and where its records are.
 struct ClusterTerm {
@@ -47,6 +57,26 @@ struct TexelAddress {
 inline constexpr uint32_t page_side_max = 4096;
 inline constexpr uint32_t page_count_max = 256;
 
+// What planning needs to know of receivers of one kind.
+struct ReceiverView {
+    std::span<const Cluster> clusters;
+    std::span<const ClusterTerm> terms;
+    std::span<const Batch> batches;
+    uint32_t record_bytes = 0;
+};
+
+// The light probes of a level: receivers like texels, with clusters of their own.
+struct ProbeData {
+    std::vector<ProbeRecord> base;  // by the probe's number
+    std::vector<Cluster> clusters;  // as in PackData, as are the next two
+    std::vector<ClusterTerm> terms;
+    std::vector<Batch> batches;
+    std::vector<uint32_t> numbers;        // per receiver, the probe that it is
+    std::vector<uint32_t> record_counts;  // per contribution; empty where there are no receivers
+    std::vector<ProbeRecord> payload;     // contribution-major
+    ReceiverView view() const { return {clusters, terms, batches, sizeof(ProbeRecord)}; }
+};
+
 struct PackData {
     float exposure = 1;
     ColorFormat color_format = ColorFormat::R11G11B10F;
@@ -60,9 +90,12 @@ struct PackData {
     std::vector<Batch> batches;        // in order of first_receiver; they tile the receivers
     std::vector<uint32_t> addresses;   // TexelAddress per receiver
     std::vector<TexelRecord> payload;  // contribution-major: all records of contribution 0, then 1, ...
+    ProbeData probes;
     std::vector<Mesh> meshes;
     std::vector<Viewpoint> viewpoints;
     std::string settings_json;  // every resolved setting of the cook and where it came from
+
+    ReceiverView texelView() const { return {clusters, terms, batches, sizeof(TexelRecord)}; }
 };
 
 // Checks everything that an executor relies on: every index in range, clusters and batches tile the receivers,

@@ -70,6 +70,7 @@ class Reader {
         then([&] { return array(ChunkType::Batches, d.batches); });
         then([&] { return array(ChunkType::Addresses, d.addresses); });
         then([&] { return readPayload(d); });
+        then([&] { return readProbes(d); });
         then([&] { return table(ChunkType::Meshes, [&](ByteReader& in) { readMeshes(in, d); }); });
         then([&] { return table(ChunkType::Viewpoints, [&](ByteReader& in) { readViewpoints(in, d); }); });
         then([&] { return table(ChunkType::Settings, [&](ByteReader& in) { d.settings_json = in.getString(); }); });
@@ -127,6 +128,13 @@ class Reader {
             case ChunkType::Batches:
             case ChunkType::Addresses:
             case ChunkType::Payload:
+            case ChunkType::ProbeBase:
+            case ChunkType::ProbeClusters:
+            case ChunkType::ProbeTerms:
+            case ChunkType::ProbeBatches:
+            case ChunkType::ProbeNumbers:
+            case ChunkType::ProbeCounts:
+            case ChunkType::ProbePayload:
             case ChunkType::Meshes:
             case ChunkType::Viewpoints:
             case ChunkType::Settings:
@@ -191,6 +199,18 @@ class Reader {
                            d.contributions[k].receivers);
         }
         return {};
+    }
+
+    Expected<void> readProbes(PackData& d) {
+        if (!by_name_.contains({static_cast<uint32_t>(ChunkType::ProbeBase), 0})) return {};
+        Expected<void> ok = array(ChunkType::ProbeBase, d.probes.base);
+        if (ok) ok = array(ChunkType::ProbeClusters, d.probes.clusters);
+        if (ok) ok = array(ChunkType::ProbeTerms, d.probes.terms);
+        if (ok) ok = array(ChunkType::ProbeBatches, d.probes.batches);
+        if (ok) ok = array(ChunkType::ProbeNumbers, d.probes.numbers);
+        if (ok) ok = array(ChunkType::ProbeCounts, d.probes.record_counts);
+        if (ok) ok = array(ChunkType::ProbePayload, d.probes.payload);
+        return ok;
     }
 
     static void readElements(ByteReader& in, PackData& d) {

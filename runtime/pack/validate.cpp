@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <set>
 
 namespace dimmer {
@@ -70,26 +71,29 @@ Expected<void> validateContributions(const PackData& d) {
     return {};
 }
 
+// Texels or probes: what their clusters tile, and how many records each contribution has there.
+struct Kind {
+    ReceiverView view;
+    uint64_t receivers;
+    std::vector<uint64_t> record_counts;
+};
+
 // Terms of a cluster ascend by contribution, and each contribution's records are handed out in cluster order, so every
 // record is used exactly once.
-Expected<void> validateTerms(const PackData& d) {
-    std::vector<uint64_t> next(d.contributions.size());
+Expected<void> validateTerms(const Kind& kind) {
+    std::vector<uint64_t> next, ends;
     uint64_t first = 0;
-    for (size_t k = 0; k < next.size(); ++k) {
-        next[k] = first;
-        first += d.contributions[k].receivers;
+    for (const uint64_t count : kind.record_counts) {
+        next.push_back(first);
+        ends.push_back(first += count);
     }
-    const std::vector<uint64_t> ends = [&] {
-        std::vector<uint64_t> e(next.size());
-        for (size_t k = 0; k < e.size(); ++k) e[k] = next[k] + d.contributions[k].receivers;
-        return e;
-    }();
-    for (size_t i = 0; i < d.clusters.size(); ++i) {
-        const Cluster& c = d.clusters[i];
+    const auto terms = kind.view.terms;
+    for (size_t i = 0; i < kind.view.clusters.size(); ++i) {
+        const Cluster& c = kind.view.clusters[i];
         for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) {
-            const ClusterTerm& term = d.terms[t];
+            const ClusterTerm& term = terms[t];
             if (term.contribution >= next.size()) return bad("cluster {} names contribution {}", i, term.contribution);
-            if (t > c.first_term && d.terms[t - 1].contribution >= term.contribution)
+            if (t > c.first_term && terms[t - 1].contribution >= term.contribution)
                 return bad("the contributions of cluster {} are out of order", i);
             if (term.first_record != next[term.contribution]) return bad("cluster {} misplaces its records", i);
             next[term.contribution] += c.receiver_count;
@@ -101,29 +105,58 @@ Expected<void> validateTerms(const PackData& d) {
     return {};
 }
 
-Expected<void> validateClusters(const PackData& d) {
+Expected<void> validateClusters(const Kind& kind) {
+    const auto batches = kind.view.batches;
     uint64_t receiver = 0, batch = 0, term = 0;
-    for (size_t i = 0; i < d.clusters.size(); ++i) {
-        const Cluster& c = d.clusters[i];
+    for (size_t i = 0; i < kind.view.clusters.size(); ++i) {
+        const Cluster& c = kind.view.clusters[i];
         if (c.first_receiver != receiver || c.first_batch != batch || c.first_term != term || c.receiver_count == 0)
             return bad("cluster {} does not follow the one before it", i);
         receiver += c.receiver_count;
         batch += c.batch_count;
         term += c.term_count;
-        if (receiver > d.addresses.size() || batch > d.batches.size() || term > d.terms.size())
+        if (receiver > kind.receivers || batch > batches.size() || term > kind.view.terms.size())
             return bad("cluster {} reaches past the tables", i);
         uint64_t covered = c.first_receiver;
         for (uint64_t b = c.first_batch; b < batch; ++b) {
-            const Batch& item = d.batches[b];
+            const Batch& item = batches[b];
             if (item.first_receiver != covered || item.receiver_count == 0 || item.receiver_count > batch_receivers_max)
                 return bad("batch {} does not follow the one before it", b);
             covered += item.receiver_count;
         }
         if (covered != receiver) return bad("the batches of cluster {} do not cover it", i);
     }
-    if (receiver != d.addresses.size() || batch != d.batches.size() || term != d.terms.size())
+    if (receiver != kind.receivers || batch != batches.size() || term != kind.view.terms.size())
         return bad("its clusters do not cover its tables");
     return {};
+}
+
+Expected<void> validateTexels(const PackData& d) {
+    Kind kind{d.texelView(), d.addresses.size(), {}};
+    for (const Contribution& c : d.contributions) kind.record_counts.push_back(c.receivers);
+    if (auto ok = validateClusters(kind); !ok) return ok;
+    return validateTerms(kind);
+}
+
+Expected<void> validateProbes(const PackData& d) {
+    const ProbeData& p = d.probes;
+    if (p.base.empty() && p.numbers.empty() && p.payload.empty() && p.clusters.empty() && p.record_counts.empty())
+        return {};
+    if (p.record_counts.size() != d.contributions.size())
+        return bad("it counts the probes' records of {} contributions, not {}", p.record_counts.size(),
+                   d.contributions.size());
+    const Kind kind{p.view(), p.numbers.size(), {p.record_counts.begin(), p.record_counts.end()}};
+    const uint64_t records = std::accumulate(kind.record_counts.begin(), kind.record_counts.end(), uint64_t{0});
+    if (records != p.payload.size())
+        return bad("its contributions list {} records of probes, the payload holds {}", records, p.payload.size());
+    std::vector<bool> taken(p.base.size());
+    for (const uint32_t number : p.numbers) {
+        if (number >= p.base.size() || taken[number])
+            return bad("a receiver is probe {} of {}, or two are", number, p.base.size());
+        taken[number] = true;
+    }
+    if (auto ok = validateClusters(kind); !ok) return ok;
+    return validateTerms(kind);
 }
 
 Expected<void> validateAddresses(const PackData& d) {
@@ -164,8 +197,8 @@ Expected<void> validateMeshes(const PackData& d) {
 }  // namespace
 
 Expected<void> validate(const PackData& data) {
-    for (auto* check : {validatePages, validateElements, validateContributions, validateClusters, validateTerms,
-                        validateAddresses, validateMeshes})
+    for (auto* check : {validatePages, validateElements, validateContributions, validateTexels, validateAddresses,
+                        validateProbes, validateMeshes})
         if (auto ok = check(data); !ok) return ok;
     return {};
 }

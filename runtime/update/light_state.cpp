@@ -91,10 +91,40 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 
 }  // namespace
 
-LightState::LightState(const Pack& pack) : pack_(pack), planner_(std::make_unique<Planner>(pack_.data())) {}
+LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack), held_(pack.elements().size()) {
+    const PackData& data = pack_.data();
+    const auto add = [&](const ReceiverView& receivers, std::vector<std::unique_ptr<Planner>>& planners) {
+        const auto tables = std::make_shared<const PlanTables>(data, receivers);
+        for (uint32_t i = 0; i < page_sets; ++i) planners.push_back(std::make_unique<Planner>(data, receivers, tables));
+    };
+    add(data.texelView(), planners_);
+    if (!data.probes.payload.empty()) add(data.probes.view(), probe_planners_);
+}
 LightState::~LightState() = default;
 LightState::LightState(LightState&&) noexcept = default;
 LightState& LightState::operator=(LightState&&) noexcept = default;
+
+void LightState::setElement(uint32_t element, Weight weight) {
+    for (auto* planners : {&planners_, &probe_planners_})
+        for (auto& planner : *planners) planner->setElement(element, normalised(weight));
+}
+
+Expected<void> LightState::checkHeld(uint32_t element, const Weight& weight) const {
+    if (!held_[element] || weight == Weight(0)) return {};
+    return fail(
+        ErrorCode::InvalidArgument,
+        fmt::format("Light set \"{}\": its records are not loaded, so its weight is held at 0; load them first.",
+                    pack_.elements()[element].name));
+}
+
+Expected<void> LightState::checkSet(LightSet set) const {
+    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element);
+}
+
+void LightState::hold(LightSet set, bool held) {
+    if (held) setElement(set.element, 0);
+    held_[set.element] = held;
+}
 
 Expected<LightSet> LightState::lightSet(std::string_view name) const {
     const auto index = lookUp(pack_.elements(), ElementKind::LightSet, name);
@@ -111,14 +141,15 @@ Expected<Door> LightState::door(std::string_view name) const {
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::LightSet, set.element); !ok) return ok;
     if (auto ok = checkWeight(pack_.elements()[set.element], weight); !ok) return ok;
-    planner_->setElement(set.element, normalised(weight));
+    if (auto ok = checkHeld(set.element, weight); !ok) return ok;
+    setElement(set.element, weight);
     return {};
 }
 
 Expected<void> LightState::setDoor(Door door, float open) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::Door, door.element); !ok) return ok;
     if (auto ok = checkOpen(pack_.elements()[door.element], open); !ok) return ok;
-    planner_->setElement(door.element, normalised(Weight(open)));
+    setElement(door.element, Weight(open));
     return {};
 }
 
@@ -133,24 +164,35 @@ Expected<void> LightState::apply(std::string_view state) {
         for (uint32_t i = 0; i < elements.size(); ++i) {
             if (elements[i].kind != ElementKind::LightSet) continue;
             if (auto ok = checkWeight(elements[i], assignment.value); !ok) return ok;
-            changes.push_back({i, assignment.value});
+            if (!held_[i]) changes.push_back({i, assignment.value});
         }
     }
     for (const StateAssignment& assignment : *assignments) {
         if (assignment.target == StateAssignment::Target::AllSets) continue;
         if (auto ok = resolve(elements, assignment, changes); !ok) return ok;
     }
-    for (const ElementChange& change : changes) planner_->setElement(change.element, normalised(change.weight));
+    for (const ElementChange& change : changes)
+        if (auto ok = checkHeld(change.element, change.weight); !ok) return ok;
+    for (const ElementChange& change : changes) setElement(change.element, change.weight);
+    return {};
+}
+
+Expected<void> LightState::setLimits(const UpdateLimits& limits) {
+    if (!(limits.tolerance_quanta >= 0 && std::isfinite(limits.tolerance_quanta)))
+        return fail(
+            ErrorCode::InvalidArgument,
+            fmt::format("A tolerance of {} quanta is neither 0 nor a positive number.", limits.tolerance_quanta));
+    for (auto& planner : planners_) planner->setLimits(limits);
     return {};
 }
 
 // A handle of another pack has no weight here; 0 is the harmless answer.
 Weight LightState::weight(LightSet set) const {
-    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner_->element(set.element) : 0.0f;
+    return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner().element(set.element) : 0.0f;
 }
 
 float LightState::open(Door door) const {
-    return checkHandle(pack_.elements(), ElementKind::Door, door.element) ? planner_->element(door.element).r : 0.0f;
+    return checkHandle(pack_.elements(), ElementKind::Door, door.element) ? planner().element(door.element).r : 0.0f;
 }
 
 }  // namespace dimmer

@@ -3,6 +3,7 @@
 #include <format/texel.h>
 
 #include <bit>
+#include <cmath>
 
 namespace dimmer {
 namespace {
@@ -11,28 +12,15 @@ bool isOn(const Weight& w) {
     return w.r != 0 || w.g != 0 || w.b != 0;
 }
 
-// Pairs (list, value) into lists; values keep their order.
-template <class Lists, class ForEachPair>
-Lists makeLists(size_t list_count, ForEachPair&& for_each_pair) {
-    Lists lists;
-    lists.first.assign(list_count + 1, 0);
-    for_each_pair([&](uint32_t list, uint32_t) { ++lists.first[list + 1]; });
-    for (size_t i = 1; i <= list_count; ++i) lists.first[i] += lists.first[i - 1];
-    lists.values.resize(lists.first[list_count]);
-    std::vector<uint32_t> next = lists.first;
-    for_each_pair([&](uint32_t list, uint32_t value) { lists.values[next[list]++] = value; });
-    return lists;
+// By how much the weights of any channel differ.
+float distance(const Weight& a, const Weight& b) {
+    return std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)});
 }
 
 }  // namespace
 
-std::span<const uint32_t> Planner::Lists::operator[](uint32_t i) const {
-    return std::span(values).subspan(first[i], first[i + 1] - first[i]);
-}
-
-Planner::Planner(const PackData& data) : data_(data) {
-    buildLists();
-
+Planner::Planner(const PackData& data, const ReceiverView& receivers, std::shared_ptr<const PlanTables> tables)
+    : data_(data), receivers_(receivers), tables_(std::move(tables)) {
     for (const Element& element : data.elements)
         elements_.emplace_back(element.kind == ElementKind::LightSet ? std::min(1.0f, element.max_weight) : 0.0f);
     planned_.assign(data.contributions.size(), Weight(0));
@@ -42,31 +30,14 @@ Planner::Planner(const PackData& data) : data_(data) {
     dirty_elements_.reserve(data.elements.size());
     dirty_contributions_.reserve(data.contributions.size());
     changes_.reserve(data.contributions.size());
-    cluster_marks_.resize((data.clusters.size() + 63) / 64);
-    changed_clusters_.reserve(data.clusters.size());
-    cluster_terms_.reserve(data.clusters.size());
+    waiting_.resize(receivers.clusters.size());
+    waiting_clusters_.reserve(receivers.clusters.size());
+    cluster_marks_.resize((receivers.clusters.size() + 63) / 64);
+    parts_.reserve(receivers.clusters.size());
     items_.resize(itemsMax());
     terms_.reserve(termsMax());
 
     for (uint32_t k = 0; k < data.contributions.size(); ++k) markDirty(k);
-}
-
-void Planner::buildLists() {
-    contributions_of_element_ = makeLists<Lists>(data_.elements.size(), [&](auto&& pair) {
-        for (uint32_t k = 0; k < data_.contributions.size(); ++k) {
-            const Contribution& c = data_.contributions[k];
-            if (c.light_set) pair(*c.light_set, k);
-            for (uint32_t door : c.doors_open) pair(door, k);
-            for (uint32_t door : c.doors_closed) pair(door, k);
-        }
-    });
-    clusters_of_contribution_ = makeLists<Lists>(data_.contributions.size(), [&](auto&& pair) {
-        for (uint32_t i = 0; i < data_.clusters.size(); ++i) {
-            const Cluster& c = data_.clusters[i];
-            for (uint32_t t = 0; t < c.term_count; ++t) pair(data_.terms[c.first_term + t].contribution, i);
-        }
-    });
-    for (const Cluster& c : data_.clusters) overlap_max_ = std::max(overlap_max_, c.term_count);
 }
 
 void Planner::setElement(uint32_t index, Weight weight) {
@@ -75,6 +46,14 @@ void Planner::setElement(uint32_t index, Weight weight) {
     if (element_is_dirty_[index]) return;
     element_is_dirty_[index] = true;
     dirty_elements_.push_back(index);
+}
+
+void Planner::setLimits(const UpdateLimits& limits) {
+    limits_ = limits;
+    recheck_ = true;
+    if (!quanta_per_weight_.empty() || (limits.receivers_max == 0 && limits.tolerance_quanta == 0)) return;
+    quanta_per_weight_ = quantaPerWeight(data_);
+    for (const ClusterTerm& term : receivers_.terms) written_.push_back(planned_[term.contribution]);
 }
 
 void Planner::markDirty(uint32_t contribution) {
@@ -93,14 +72,20 @@ Weight Planner::product(const Contribution& contribution) const {
     return {bounded(dim.r), bounded(dim.g), bounded(dim.b)};
 }
 
+bool Planner::upToDate() const {
+    const auto unchanged = [&](uint32_t k) { return product(data_.contributions[k]) == planned_[k]; };
+    return waiting_clusters_.empty() && !recheck_ && std::ranges::all_of(dirty_contributions_, unchanged) &&
+           std::ranges::all_of(dirty_elements_, [&](uint32_t element) {
+               return std::ranges::all_of(tables_->contributions_of_element[element], unchanged);
+           });
+}
+
 void Planner::collectChanges() {
     for (uint32_t element : dirty_elements_) {
         element_is_dirty_[element] = false;
-        for (uint32_t k : contributions_of_element_[element]) markDirty(k);
+        for (uint32_t k : tables_->contributions_of_element[element]) markDirty(k);
     }
     dirty_elements_.clear();
-
-    changes_.clear();
     for (uint32_t k : dirty_contributions_) {
         contribution_is_dirty_[k] = false;
         const Weight weight = product(data_.contributions[k]);
@@ -109,80 +94,185 @@ void Planner::collectChanges() {
         planned_[k] = weight;
     }
     dirty_contributions_.clear();
+    // Once every weight is known: what is put off depends on all of them.
+    for (const Change& change : changes_)
+        for (const Holder& holder : tables_->holders_of_contribution[change.contribution])
+            touch(holder, change.before, planned_[change.contribution]);
+    if (recheck_) touchAllPutOff();
+    recheck_ = false;
 }
 
-// Through a bit per cluster: no cluster twice, and in ascending order, without sorting.
-void Planner::collectClusters() {
-    size_t first_word = cluster_marks_.size(), end_word = 0;
-    for (const Change& change : changes_) {
-        const auto clusters = clusters_of_contribution_[change.contribution];
-        if (clusters.empty()) continue;
-        for (uint32_t i : clusters) cluster_marks_[i / 64] |= uint64_t{1} << (i % 64);
-        first_word = std::min<size_t>(first_word, clusters.front() / 64);
-        end_word = std::max<size_t>(end_word, clusters.back() / 64 + 1);
+void Planner::waitWhole(uint32_t cluster) {
+    Waiting& waiting = waiting_[cluster];
+    if (waiting.count == 0) waiting_clusters_.push_back(cluster);
+    waiting.count = receivers_.clusters[cluster].batch_count;
+}
+
+void Planner::touch(const Holder& holder, const Weight& before, const Weight& now) {
+    Waiting& waiting = waiting_[holder.cluster];
+    if (limits_.tolerance_quanta > 0 && waiting.count == 0 &&
+        quantaPutOff(receivers_.clusters[holder.cluster]) <= limits_.tolerance_quanta) {
+        ++stats_.clusters_put_off;
+        return;
     }
-    changed_clusters_.clear();
+    waitWhole(holder.cluster);
+    if (!quanta_per_weight_.empty()) waiting.quanta += distance(before, now) * quanta_per_weight_[holder.term];
+}
+
+// How far the light of a cluster that does not wait is from what the weights say, at most: measured from what was
+// written, so many small changes cannot add up unseen.
+float Planner::quantaPutOff(const Cluster& cluster) const {
+    float quanta = 0;
+    for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
+        quanta += distance(written_[t], planned_[receivers_.terms[t].contribution]) * quanta_per_weight_[t];
+    return quanta;
+}
+
+void Planner::touchAllPutOff() {
+    if (written_.empty()) return;
+    for (uint32_t i = 0; i < receivers_.clusters.size(); ++i)
+        if (waiting_[i].count == 0 && quantaPutOff(receivers_.clusters[i]) > limits_.tolerance_quanta) waitWhole(i);
+}
+
+// Up to so many receivers of a cluster's waiting batches become a part, one batch at least.
+void Planner::take(uint32_t cluster_index, uint32_t receivers) {
+    const Cluster& cluster = receivers_.clusters[cluster_index];
+    Waiting& waiting = waiting_[cluster_index];
+    const uint32_t batches = std::min(waiting.count, std::max(1u, receivers / batch_receivers_max));
+    parts_.push_back({cluster_index, waiting.first, batches});
+    waiting.first = (waiting.first + batches) % cluster.batch_count;
+    waiting.count -= batches;
+    if (waiting.count > 0) return;
+    waiting = {};
+    if (written_.empty()) return;
+    for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t)
+        written_[t] = planned_[receivers_.terms[t].contribution];
+}
+
+// In ascending order: neighbours on the pages are neighbours in memory. Through a bit per cluster, without sorting.
+void Planner::takeAll() {
+    size_t first_word = cluster_marks_.size(), end_word = 0;
+    for (uint32_t i : waiting_clusters_) {
+        cluster_marks_[i / 64] |= uint64_t{1} << (i % 64);
+        first_word = std::min<size_t>(first_word, i / 64);
+        end_word = std::max<size_t>(end_word, i / 64 + 1);
+    }
     for (size_t word = first_word; word < end_word; ++word) {
         for (uint64_t bits = cluster_marks_[word]; bits != 0; bits &= bits - 1)
-            changed_clusters_.push_back(static_cast<uint32_t>(word * 64) +
-                                        static_cast<uint32_t>(std::countr_zero(bits)));
+            take(static_cast<uint32_t>(word * 64) + static_cast<uint32_t>(std::countr_zero(bits)), UINT32_MAX);
         cluster_marks_[word] = 0;
+    }
+    waiting_clusters_.clear();
+}
+
+// The most visible first; what has waited counts for more with every plan, so nothing waits for ever.
+void Planner::takeWithin(uint32_t receivers) {
+    const auto urgency = [&](uint32_t cluster) {
+        const Waiting& waiting = waiting_[cluster];
+        return (waiting.quanta + 1) * static_cast<float>(waiting.plans + 1);
+    };
+    std::ranges::sort(waiting_clusters_, [&](uint32_t a, uint32_t b) {
+        const float first = urgency(a), second = urgency(b);
+        return first != second ? first > second : a < b;
+    });
+    int64_t left = receivers;
+    for (uint32_t cluster : waiting_clusters_) {
+        if (left < batch_receivers_max && !parts_.empty()) break;
+        const uint32_t before = waiting_[cluster].count;
+        take(cluster, static_cast<uint32_t>(std::max<int64_t>(left, 0)));
+        left -= int64_t{before - waiting_[cluster].count} * batch_receivers_max;
+    }
+    std::ranges::sort(parts_, {}, &Part::cluster);
+    std::erase_if(waiting_clusters_, [&](uint32_t cluster) { return waiting_[cluster].count == 0; });
+    for (uint32_t cluster : waiting_clusters_) {
+        ++waiting_[cluster].plans;
+        stats_.receivers_waiting +=
+            std::min(waiting_[cluster].count * batch_receivers_max, receivers_.clusters[cluster].receiver_count);
     }
 }
 
 // Lists the cluster's terms that are on, and counts.
-Planner::Terms Planner::planCluster(const Cluster& cluster) {
-    const auto first_term = static_cast<uint32_t>(terms_.size());
+void Planner::planPart(Part& part) {
+    const Cluster& cluster = receivers_.clusters[part.cluster];
+    part.first_term = static_cast<uint32_t>(terms_.size());
     const float scale = weightScale(data_.color_format);
-    for (uint32_t slot = 0; slot < cluster.term_count; ++slot) {
-        const Weight& w = planned_[data_.terms[cluster.first_term + slot].contribution];
-        if (isOn(w)) terms_.push_back({slot, w.r * scale, w.g * scale, w.b * scale});
+    for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
+        const Weight& w = planned_[receivers_.terms[t].contribution];
+        if (isOn(w)) terms_.push_back({t, w.r * scale, w.g * scale, w.b * scale});
     }
-    const uint32_t on = static_cast<uint32_t>(terms_.size()) - first_term;
-    work_.groups[workGroupOf(on)].item_count += cluster.batch_count;
+    part.term_count = static_cast<uint32_t>(terms_.size()) - part.first_term;
+    uint64_t receivers = cluster.receiver_count;
+    if (part.batch_count < cluster.batch_count) {
+        receivers = 0;
+        for (uint32_t b = 0; b < part.batch_count; ++b)
+            receivers +=
+                receivers_.batches[cluster.first_batch + (part.first_batch + b) % cluster.batch_count].receiver_count;
+    }
+    work_.groups[workGroupOf(part.term_count)].item_count += part.batch_count;
     ++stats_.clusters;
-    stats_.batches += cluster.batch_count;
-    stats_.receivers += cluster.receiver_count;
-    stats_.bytes_read += uint64_t{cluster.receiver_count} * (sizeof(uint32_t) + sizeof(TexelRecord) * (1 + on));
-    stats_.bytes_written += uint64_t{cluster.receiver_count} * sizeof(TexelRecord);
-    return {first_term, on};
+    stats_.batches += part.batch_count;
+    stats_.receivers += receivers;
+    stats_.bytes_read += receivers * (sizeof(uint32_t) + receivers_.record_bytes * (1 + part.term_count));
+    stats_.bytes_written += receivers * receivers_.record_bytes;
 }
 
 void Planner::emitWork() {
-    cluster_terms_.clear();
-    for (uint32_t i : changed_clusters_) cluster_terms_.push_back(planCluster(data_.clusters[i]));
+    for (Part& part : parts_) planPart(part);
     std::array<uint32_t, work_group_count> next{};
     for (uint32_t g = 1; g < work_group_count; ++g)
         next[g] = work_.groups[g].first_item = work_.groups[g - 1].first_item + work_.groups[g - 1].item_count;
-    for (size_t c = 0; c < changed_clusters_.size(); ++c) {
-        const Cluster& cluster = data_.clusters[changed_clusters_[c]];
-        const Terms& terms = cluster_terms_[c];
-        uint32_t& item = next[workGroupOf(terms.count)];
-        for (uint32_t b = 0; b < cluster.batch_count; ++b)
-            items_[item++] = {cluster.first_batch + b, terms.first, terms.count, changed_clusters_[c]};
+    for (const Part& part : parts_) {
+        const Cluster& cluster = receivers_.clusters[part.cluster];
+        uint32_t& item = next[workGroupOf(part.term_count)];
+        for (uint32_t b = 0; b < part.batch_count; ++b) {
+            const uint32_t batch = (part.first_batch + b) % cluster.batch_count;
+            items_[item++] = {cluster.first_batch + batch, part.first_term, part.term_count, part.cluster};
+        }
     }
+    work_.items = std::span(items_).first(stats_.batches);
+    work_.terms = terms_;
 }
 
 bool Planner::plan() {
     work_ = {};
     stats_ = {};
-    terms_.clear();
+    changes_.clear();
+    carried_over_ = waiting() || recheck_;
     collectChanges();
     stats_.contributions_changed = static_cast<uint32_t>(changes_.size());
-    if (changes_.empty()) return false;
-    collectClusters();
+    return finishPlan();
+}
+
+bool Planner::planWaiting() {
+    work_ = {};
+    stats_ = {};
+    changes_.clear();
+    carried_over_ = true;
+    return finishPlan();
+}
+
+bool Planner::finishPlan() {
+    terms_.clear();
+    parts_.clear();
+    if (waiting_clusters_.empty()) return false;
+    if (limits_.receivers_max == 0)
+        takeAll();
+    else
+        takeWithin(limits_.receivers_max);
     emitWork();
-    work_.items = std::span(items_).first(stats_.batches);
-    work_.terms = terms_;
     return stats_.batches > 0;
 }
 
 void Planner::rollback() {
+    // With limits or leftovers, what the pages hold is known by cluster only: those planned are written once more.
+    if (carried_over_ || !written_.empty())
+        for (const Part& part : parts_) waitWhole(part.cluster);
     for (const Change& change : changes_) {
         planned_[change.contribution] = change.before;
         markDirty(change.contribution);
     }
     changes_.clear();
+    parts_.clear();
     work_ = {};
     stats_ = {};
 }

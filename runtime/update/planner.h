@@ -3,10 +3,12 @@
 
 #include <dimmer/light_state.h>
 #include <pack/pack_data.h>
+#include <update/plan_tables.h>
 
 #include <algorithm>
 #include <array>
 #include <dimmer/work_list.glsl>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -36,21 +38,36 @@ struct WorkList {
 // Weights above this are taken as this: every texel they touch is as bright as the format goes.
 inline constexpr float planned_weight_max = 0x1p27f;
 
+// Plans the updates of one set of pages. Each cluster is either as the weights say, or has batches that wait: which do,
+// is a range of its batches, taken up round robin, so that a limit per plan starves none.
 class Planner {
    public:
     // `data` must be valid and must outlive the planner. Pages are taken to hold the base. Reserves for the worst
     // case, so that later calls allocate nothing.
-    explicit Planner(const PackData& data);
+    Planner(const PackData& data, const ReceiverView& receivers, std::shared_ptr<const PlanTables> tables);
+    Planner(const PackData& data, const ReceiverView& receivers)
+        : Planner(data, receivers, std::make_shared<const PlanTables>(data, receivers)) {}
+    explicit Planner(const PackData& data) : Planner(data, data.texelView()) {}  // of the lightmap's texels
 
     const Weight& element(uint32_t index) const { return elements_[index]; }
     // Constant time; takes effect with the next plan().
     void setElement(uint32_t index, Weight weight);
+    // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records.
+    void setLimits(const UpdateLimits& limits);
 
-    // Plans what changed since the last plan() and counts it as written. Cost: constant when nothing changed, else
-    // in proportion to the clusters that hold a changed contribution. False: nothing to do, work() is empty.
+    // Plans what changed since the last plan(), and what waits, and counts it as written. Cost: constant when there is
+    // nothing to do, else in proportion to the clusters that hold a changed contribution. False: nothing to do, work()
+    // is empty.
     bool plan();
+    // The same for what waits alone; changes are left to the next plan().
+    bool planWaiting();
     // The last plan was not executed: what it would have written is written by the next one.
     void rollback();
+
+    // Whether batches wait, as the last plan was limited.
+    bool waiting() const { return !waiting_clusters_.empty(); }
+    // Whether plan() has nothing to do, by the weights.
+    bool upToDate() const;
 
     const WorkList& work() const { return work_; }
     // As the last plan() left it; 0 is off.
@@ -60,52 +77,75 @@ class Planner {
     const UpdateStats& stats() const { return stats_; }
 
     // Largest sizes of a work list, for buffers.
-    uint32_t itemsMax() const { return static_cast<uint32_t>(data_.batches.size()); }
-    uint32_t termsMax() const { return static_cast<uint32_t>(data_.terms.size()); }
+    uint32_t itemsMax() const { return static_cast<uint32_t>(receivers_.batches.size()); }
+    uint32_t termsMax() const { return static_cast<uint32_t>(receivers_.terms.size()); }
     // The largest number of contributions of any cluster.
-    uint32_t overlapMax() const { return overlap_max_; }
+    uint32_t overlapMax() const { return tables_->overlap_max; }
 
    private:
-    // Lists of lists in one array: list i is values[first[i] .. first[i + 1]).
-    struct Lists {
-        std::vector<uint32_t> first, values;
-        std::span<const uint32_t> operator[](uint32_t i) const;
-    };
     struct Change {
         uint32_t contribution;
         Weight before;
     };
+    // Batches of a cluster that wait: `count` of them from `first` on, going round.
+    struct Waiting {
+        uint32_t first = 0, count = 0;
+        uint32_t plans = 0;  // that passed it by
+        float quanta = 0;    // by which the light there has changed, at most
+    };
+    // A part of a cluster to write now, and its terms that are on.
+    struct Part {
+        uint32_t cluster, first_batch, batch_count;
+        uint32_t first_term = 0, term_count = 0;
+    };
 
-    void buildLists();
     Weight product(const Contribution& contribution) const;
     void markDirty(uint32_t contribution);
     void collectChanges();
-    void collectClusters();
-    // The terms that are on in a cluster, in terms_.
-    struct Terms {
-        uint32_t first = 0, count = 0;
-    };
-
-    Terms planCluster(const Cluster& cluster);
+    void touch(const Holder& holder, const Weight& before, const Weight& now);
+    void waitWhole(uint32_t cluster);
+    float quantaPutOff(const Cluster& cluster) const;
+    void touchAllPutOff();
+    bool finishPlan();
+    void takeAll();
+    void takeWithin(uint32_t receivers);
+    void take(uint32_t cluster, uint32_t receivers);
+    void planPart(Part& part);
     void emitWork();
 
     const PackData& data_;
-    Lists contributions_of_element_, clusters_of_contribution_;
-    uint32_t overlap_max_ = 0;
+    const ReceiverView receivers_;
+    std::shared_ptr<const PlanTables> tables_;
+    UpdateLimits limits_;
+    std::vector<float> quanta_per_weight_;  // per term; empty until there are limits
+    std::vector<Weight> written_;           // per term, as clusters that do not wait hold it; likewise
+    bool recheck_ = false;                  // the limits changed: look at every cluster
 
     std::vector<Weight> elements_;  // as the game set them
-    std::vector<Weight> planned_;   // per contribution, as the pages hold it
+    std::vector<Weight> planned_;   // per contribution
     std::vector<uint32_t> dirty_elements_, dirty_contributions_;
     std::vector<bool> element_is_dirty_, contribution_is_dirty_;
 
     std::vector<Change> changes_;             // of the last plan
+    bool carried_over_ = false;               // some clusters waited already when the last plan began
+    std::vector<Waiting> waiting_;            // per cluster
+    std::vector<uint32_t> waiting_clusters_;  // those with a count
     std::vector<uint64_t> cluster_marks_;     // one bit per cluster
-    std::vector<uint32_t> changed_clusters_;  // ascending
-    std::vector<Terms> cluster_terms_;        // of changed_clusters_
+    std::vector<Part> parts_;                 // of the last plan, ascending by cluster
     std::vector<WorkItem> items_;
     std::vector<WorkTerm> terms_;
     WorkList work_;
     UpdateStats stats_;
 };
+
+// Adds what an update did to probes to what it did to texels.
+inline void addProbes(const UpdateStats& probes, UpdateStats& stats) {
+    stats.contributions_changed = std::max(stats.contributions_changed, probes.contributions_changed);
+    stats.clusters += probes.clusters;
+    stats.batches += probes.batches;
+    stats.receivers += probes.receivers;
+    stats.bytes_read += probes.bytes_read;
+    stats.bytes_written += probes.bytes_written;
+}
 
 }  // namespace dimmer

@@ -20,6 +20,25 @@ dimmer::Expected<dimmer::Runtime> loadLights(const dimmer::VulkanContext& vulkan
 }
 // end snippet
 
+dimmer::Expected<void> limitUpdates(dimmer::Runtime& lights) {
+    // snippet: limits
+    // At most 200,000 texels per update, the most visible first; and leave what is less than half a step of the format.
+    if (auto ok = lights.setLimits({.receivers_max = 200000, .tolerance_quanta = 0.5f}); !ok) return ok;
+    // end snippet
+    return {};
+}
+
+dimmer::Expected<void> moveOn(dimmer::Runtime& lights, dimmer::LightSet cellar, dimmer::LightSet attic) {
+    // snippet: records
+    if (auto ok = lights.dropRecords(cellar); !ok) return ok;  // off from now on; its memory is free
+    if (auto ok = lights.loadRecords(attic); !ok) return ok;   // OutOfMemory: there is no room
+    const auto progress = lights.continueLoading();            // once a frame: sends a piece, never waits
+    if (!progress) return std::unexpected(progress.error());
+    if (progress->finished()) return lights.setWeight(attic, 1);
+    // end snippet
+    return {};
+}
+
 size_t uploaded = 0;
 void upload(const std::string&, const std::vector<MeshVertex>& vertices, const std::vector<uint32_t>&, uint32_t) {
     uploaded += vertices.size();
@@ -141,12 +160,15 @@ TEST_F(SnippetsGpu, LoadChangeAndUpdate) {
         ASSERT_TRUE(stats.has_value());
         EXPECT_EQ(stats->dispatches > 0, first);
     }
+    ASSERT_TRUE(limitUpdates(*lights).has_value());
     ASSERT_TRUE(lights->apply("all=1"));
     const auto sent = submit(*lights);
     ASSERT_TRUE(sent.has_value());
     EXPECT_NE(sent->first, VkSemaphore{VK_NULL_HANDLE});
     EXPECT_EQ(sent->second, 1u);
     ASSERT_TRUE(lights->wait().has_value());
+    const auto hall = *lights->lightSet("hall");
+    ASSERT_TRUE(moveOn(*lights, hall, hall).has_value());
 }
 
 TEST(Snippets, CpuAndMeshes) {
@@ -209,7 +231,7 @@ std::map<std::string, std::string> quotesOf(const std::string& document) {
 TEST(Snippets, DocumentsQuoteThem) {
     const std::filesystem::path root = DIMMER_SOURCE_DIR;
     auto snippets = snippetsOf(readText(root / "tests/app/snippets_test.cpp"));
-    ASSERT_EQ(snippets.size(), 7u);
+    ASSERT_EQ(snippets.size(), 9u);
     for (const char* document : {"README.md", "docs/integrate.md"}) {
         const auto quotes = quotesOf(readText(root / document));
         EXPECT_FALSE(quotes.empty()) << document;

@@ -3,16 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "random_pack.h"
+#include "pages.h"
 
 namespace dimmer {
 namespace {
 
-Pack packOf(PackData data) {
-    auto pack = Pack::fromData(std::move(data));
-    if (!pack) throw std::runtime_error(pack.error().message);
-    return *pack;
-}
+using test::packOf;
 
 std::vector<uint32_t> allTexels(const CpuRuntime& runtime) {
     std::vector<uint32_t> texels(runtime.irradiancePages().begin(), runtime.irradiancePages().end());

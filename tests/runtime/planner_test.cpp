@@ -21,8 +21,8 @@ std::map<uint32_t, std::vector<uint32_t>> recordsRead(const Planner& planner, co
             EXPECT_FALSE(reads.contains(i)) << "receiver " << i << " is written twice";
             auto& records = reads[i];
             for (uint32_t t = 0; t < item.term_count; ++t) {
-                const uint32_t slot = work.terms[item.first_term + t].slot;
-                records.push_back(data.terms[cluster.first_term + slot].first_record + i - cluster.first_receiver);
+                const uint32_t term = work.terms[item.first_term + t].term;
+                records.push_back(data.terms[term].first_record + i - cluster.first_receiver);
             }
         }
     }

@@ -159,6 +159,47 @@ inline PackData randomPack(uint32_t seed, const RandomPackOptions& options = {})
     return data;
 }
 
+inline ProbeRecord randomProbe(Random& random, ColorFormat format) {
+    ProbeRecord probe{.light = randomRecord(random, 1.0f / 64, format).irradiance, .bands = {}};
+    for (uint32_t& word : probe.bands) word = static_cast<uint32_t>(random());
+    return probe;
+}
+
+// Light probes with clusters of their own; some probes change with nothing.
+inline void addRandomProbes(PackData& data, Random& random, uint32_t clusters = 25) {
+    ProbeData& probes = data.probes;
+    const auto contributions = static_cast<uint32_t>(data.contributions.size());
+    probes.record_counts.assign(contributions, 0);
+    for (uint32_t i = 0; i < clusters; ++i) {
+        Cluster cluster{.first_receiver = static_cast<uint32_t>(probes.numbers.size()),
+                        .receiver_count = pick(random, 1, 150),
+                        .first_batch = static_cast<uint32_t>(probes.batches.size()),
+                        .batch_count = 0,
+                        .first_term = static_cast<uint32_t>(probes.terms.size()),
+                        .term_count = 0};
+        for (uint32_t done = 0; done < cluster.receiver_count; done += batch_receivers_max, ++cluster.batch_count)
+            probes.batches.push_back(
+                {cluster.first_receiver + done, std::min(batch_receivers_max, cluster.receiver_count - done)});
+        for (uint32_t k = i % 3; k < contributions; k += pick(random, 1, 4), ++cluster.term_count) {
+            probes.terms.push_back({k, probes.record_counts[k]});
+            probes.record_counts[k] += cluster.receiver_count;
+        }
+        probes.numbers.resize(probes.numbers.size() + cluster.receiver_count);
+        probes.clusters.push_back(cluster);
+    }
+    probes.base.resize(probes.numbers.size() + 7);
+    for (ProbeRecord& probe : probes.base) probe = randomProbe(random, data.color_format);
+    std::vector<uint32_t> numbers(probes.base.size());
+    std::iota(numbers.begin(), numbers.end(), 0u);
+    for (size_t i = numbers.size(); i > 1; --i) std::swap(numbers[i - 1], numbers[random() % i]);
+    std::copy_n(numbers.begin(), probes.numbers.size(), probes.numbers.begin());
+    std::vector<uint32_t> first(contributions + 1, 0);
+    for (size_t k = 0; k < contributions; ++k) first[k + 1] = first[k] + probes.record_counts[k];
+    for (ClusterTerm& term : probes.terms) term.first_record += first[term.contribution];
+    probes.payload.resize(first.back());
+    for (ProbeRecord& record : probes.payload) record = randomProbe(random, data.color_format);
+}
+
 // A state in text form: each element on, off or in between, scalar or RGB.
 inline std::string randomState(const PackData& data, Random& random) {
     std::string state;

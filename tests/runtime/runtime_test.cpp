@@ -4,16 +4,12 @@
 #include <gmock/gmock.h>
 
 #include "gpu_fixture.h"
-#include "random_pack.h"
+#include "pages.h"
 
 namespace dimmer {
 namespace {
 
-Pack packOf(PackData data) {
-    auto pack = Pack::fromData(std::move(data));
-    if (!pack) throw std::runtime_error(pack.error().message);
-    return *pack;
-}
+using test::packOf;
 
 class RuntimeTest : public test::GpuTest {
    protected:

@@ -5,14 +5,25 @@
 #include <dimmer/light_state.h>
 
 #include <array>
+#include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
 namespace dimmer {
 
+class WorkerPool;
+struct WorkList;
+struct WorkItem;
+struct TexelRecord;
+
 class CpuRuntime : public LightState {
    public:
-    explicit CpuRuntime(const Pack& pack);
+    // `threads`: how many blend large updates, the caller's included; the pages are the same whatever their number.
+    explicit CpuRuntime(const Pack& pack, uint32_t threads = 1);
+    ~CpuRuntime();
+    CpuRuntime(CpuRuntime&&) noexcept;
+    CpuRuntime& operator=(CpuRuntime&&) noexcept;
 
     // Blends what changed since the last call into the pages. Nothing changed: returns at once. Not thread-safe.
     UpdateStats update();
@@ -22,9 +33,21 @@ class CpuRuntime : public LightState {
     std::span<const uint32_t> irradiancePages() const { return irradiance_; }
     std::span<const uint32_t> directionPages() const { return direction_; }
 
+    // The light probes by their number, 7 words each; see runtime/format/probe.h.
+    std::span<const uint32_t> probes() const { return probes_; }
+
    private:
+    template <ColorFormat format>
+    void updateTexels();
+    template <ColorFormat format>
+    void updateProbes();
+    void forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend);
+
+    std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
     std::vector<uint32_t> direction_;
+    std::vector<uint32_t> probes_;
+    std::vector<TexelRecord> base_;  // per receiver, in the order in which updates read it
 };
 
 // Irradiance in lux, bilinear, of pages as above (from either runtime). `uv` is 0..1 over the page; `normal_tangent`

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <vector>
 
 namespace dimmer {
 
@@ -29,6 +30,18 @@ struct Weight {
     bool operator==(const Weight&) const = default;
 };
 
+// What an update may leave for later. In every case the pages end up exactly as the weights say, once changes stop
+// (and the tolerance is 0).
+struct UpdateLimits {
+    // Texels that one update writes at most (probes are always up to date), in whole batches of up to 64; 0: no limit.
+    // The most visible changes come first, and what waits counts for more with every update.
+    uint32_t receivers_max = 0;
+    // A cluster of texels is left as it is while none of their stored irradiances is further from what the weights
+    // say than so many steps of the format, counted from what was last written. At 0.5 the stored value is one step off
+    // at most. 0: everything is written.
+    float tolerance_quanta = 0;
+};
+
 // Not thread-safe: call from one thread at a time. Nothing here touches a GPU; a change costs nanoseconds and takes
 // effect with the runtime's next update. At the start every set has weight 1 (its maximum, where that is
 // smaller) and every door is closed.
@@ -41,26 +54,43 @@ class LightState {
     Expected<LightSet> lightSet(std::string_view name) const;
     Expected<Door> door(std::string_view name) const;
 
-    // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum.
+    // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum, and, unless
+    // it is 0, for a set whose records are not loaded (Runtime::dropRecords).
     Expected<void> setWeight(LightSet set, Weight weight);
     // `open`: 0 closed .. 1 open.
     Expected<void> setDoor(Door door, float open);
     // All at once, e.g. "hall=0.5,alarm=1/0.2/0.2,door:front=1"; "all=0" sets every light set first, wherever it is
-    // written. What is not named keeps its weight. On an error nothing has changed.
+    // written (sets whose records are not loaded stay at 0). What is not named keeps its weight. On an error nothing
+    // has changed.
     Expected<void> apply(std::string_view state);
+    // Takes effect with the next update; 0 and 0 bring the exact state with it. The first call that sets a limit costs
+    // a pass over the pack's records. Refused: a tolerance that is negative or not finite.
+    Expected<void> setLimits(const UpdateLimits& limits);
 
     Weight weight(LightSet set) const;
     float open(Door door) const;
     const Pack& pack() const { return pack_; }
 
    protected:
-    explicit LightState(const Pack& pack);
-    Planner& planner() { return *planner_; }
-    const Planner& planner() const { return *planner_; }
+    // One planner per set of pages: each knows what its own pages have yet to catch up on.
+    explicit LightState(const Pack& pack, uint32_t page_sets = 1);
+    Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }
+    const Planner& planner(uint32_t page_set = 0) const { return *planners_[page_set]; }
+    // Of the light probes; none where the pack has no dynamic light on any.
+    bool hasProbes() const { return !probe_planners_.empty(); }
+    Planner& probePlanner(uint32_t page_set = 0) { return *probe_planners_[page_set]; }
+    const Planner& probePlanner(uint32_t page_set = 0) const { return *probe_planners_[page_set]; }
+    // A held set is at 0 and refuses other weights: its records are not there. Released, it is still at 0.
+    void hold(LightSet set, bool held);
+    Expected<void> checkSet(LightSet set) const;
 
    private:
+    void setElement(uint32_t element, Weight weight);
+    Expected<void> checkHeld(uint32_t element, const Weight& weight) const;
+
     Pack pack_;
-    std::unique_ptr<Planner> planner_;
+    std::vector<std::unique_ptr<Planner>> planners_, probe_planners_;
+    std::vector<bool> held_;  // per element
 };
 
 // What one update touched. Bytes are those that the kernels read and write, by count of records.
@@ -70,6 +100,8 @@ struct UpdateStats {
     uint32_t batches = 0;
     uint64_t receivers = 0;
     uint32_t dispatches = 0;
+    uint32_t clusters_put_off = 0;   // by UpdateLimits::tolerance_quanta
+    uint64_t receivers_waiting = 0;  // left for later updates by UpdateLimits::receivers_max, at most
     uint64_t bytes_read = 0;
     uint64_t bytes_written = 0;
     double host_us = 0;  // planning and recording

@@ -18,6 +18,10 @@ struct VulkanContext {
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
     uint32_t queue_family = 0;
+    // Optional: a queue with compute on which submit() runs beside the other, of the same family or another one (then
+    // pages and records are shared concurrently between the two).
+    VkQueue compute_queue = VK_NULL_HANDLE;
+    uint32_t compute_queue_family = 0;
 };
 
 // How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
@@ -28,9 +32,23 @@ enum class UpdateMode {
     Scatter,         // one pass per contribution over 32-bit sums; all texels whenever anything changed
 };
 
+enum class Buffering {
+    InPlace,  // updates write the pages that frames sample; the barriers are in the caller's frame
+    // Updates write a second set of pages, which takes the first one's place when it is complete, so that frames in
+    // flight go on reading the old light. Twice the memory for pages.
+    Double,
+};
+
 struct RuntimeOptions {
     UpdateMode mode = UpdateMode::WorkList;
-    // Write GPU timestamps around each update, read by stats(). Off costs nothing.
+    Buffering buffering = Buffering::InPlace;
+    // Device memory for records, in bytes; 0: room for all. Less needs load_records = false: then light sets are loaded
+    // and dropped as the game moves on.
+    uint64_t records_bytes_max = 0;
+    // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
+    // always-on light that doors let through is loaded in any case.
+    bool load_records = true;
+    // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
 };
 
@@ -42,6 +60,26 @@ struct LightmapImages {
     VkImageView direction_view = VK_NULL_HANDLE;
     VkSampler sampler = VK_NULL_HANDLE;  // bilinear, clamp to edge
     uint32_t width = 0, height = 0, layers = 0;
+};
+
+enum class RecordsState { Loaded, Loading, Dropped };
+
+// Of everything that was asked for since nothing was loading.
+struct LoadProgress {
+    uint64_t done_bytes = 0, total_bytes = 0;
+    bool finished() const { return done_bytes == total_bytes; }
+};
+
+// What an update of submit() waits for: a semaphore that says that the frames which sampled the pages are done.
+struct SubmitWait {
+    VkSemaphore semaphore = VK_NULL_HANDLE;  // null: nothing
+    uint64_t value = 0;                      // for a timeline semaphore
+};
+
+// What a runtime keeps on the device between updates.
+struct DeviceFootprint {
+    uint64_t bytes = 0;      // memory of buffers and images; what drivers add to align it is not counted
+    uint32_t pipelines = 0;  // compute pipelines
 };
 
 // Not thread-safe; external synchronisation of the queue is the caller's, as in Vulkan itself.
@@ -56,13 +94,14 @@ class Runtime : public LightState {
 
     // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
     // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. Nothing
-    // changed: records nothing. One recording may be in flight at a time: before the next, the earlier submission
-    // must have completed on the GPU.
+    // changed: records nothing. One recording for each set of pages may be in flight: before the next, the earlier
+    // submission must have completed on the GPU.
     Expected<UpdateStats> record(VkCommandBuffer commands);
 
-    // The same on the context's queue, with a command buffer of the runtime's own. Returns at once; a later call waits
-    // for the earlier update. Nothing changed: no submission.
-    Expected<UpdateStats> submit();
+    // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
+    // own. Returns at once; a later call waits for the earlier update. Nothing changed: no submission, and no wait.
+    // Where the pages to write were sampled on another queue, `wait` must say when that is done.
+    Expected<UpdateStats> submit(const SubmitWait& wait = {});
     // The timeline semaphore of submit() and the value that its last submission signals.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
@@ -70,17 +109,47 @@ class Runtime : public LightState {
     // it once the commands have completed.
     Expected<UpdateStats> wait();
 
-    LightmapImages images() const;
+    // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
+    // the next update takes its light off the pages. What was record()ed before must have been submitted, and have
+    // completed where submit() has another queue. Unsupported in modes gather and scatter.
+    Expected<void> dropRecords(LightSet set);
+    // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room.
+    // Loaded, the set is at 0 and takes any weight.
+    Expected<void> loadRecords(LightSet set);
+    RecordsState recordsState(LightSet set) const;
+    // Copies the next piece, of at most so many bytes (and 4 MiB), and returns at once; while the last piece is under
+    // way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while it
+    // loads.
+    Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
+
+    // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns; the
+    // other set is pageSet() ^ 1, for descriptors that are written once.
+    LightmapImages images() const { return images(pageSet()); }
+    LightmapImages images(uint32_t page_set) const;
+    uint32_t pageSet() const;
+    // The light probes that go with a set of pages, by their number, 7 words each (see runtime/format/probe.h): a
+    // storage buffer, null where the pack has no dynamic light on any.
+    VkBuffer probes(uint32_t page_set) const;
+    // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
+    // changes anything has its pages and nothing else.
+    DeviceFootprint footprint() const;
 
     // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime.
     struct Pages {
         std::vector<uint32_t> irradiance, direction;
+        std::vector<uint32_t> probes;  // empty where probes() is null
     };
     Expected<Pages> readPages();
 
    private:
     struct Impl;
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl);
+    bool planNext();
+    void rollback();
+    const Planner* plannedProbes() const;
+    Expected<void> checkLoadable(LightSet set) const;
+    void finishLoading();
+    void finish(double host_us);
     std::unique_ptr<Impl> impl_;
 };
 

@@ -73,12 +73,16 @@ void dimmer_blend_add(inout DimmerTexelBlend sum, uint irradiance, uint directio
     sum = DimmerTexelBlend(irradiance_sum, l_sum, direction_sum);
 }
 
+// `light`: a sum of lifted channels times weights.
+uint dimmer_encode_light(vec3 light, uint format) {
+    if (format != dimmer_r11g11b10f) return dimmer_encode_e5b9g9r9(light, dimmer_blend_exponent);
+    return dimmer_encode_ufloat(light.r, 6, dimmer_blend_exponent) |
+           dimmer_encode_ufloat(light.g, 6, dimmer_blend_exponent) << 11 |
+           dimmer_encode_ufloat(light.b, 5, dimmer_blend_exponent) << 22;
+}
+
 uvec2 dimmer_blend_encode(DimmerTexelBlend sum, uint format) {
-    uint irradiance = format == dimmer_r11g11b10f
-                          ? dimmer_encode_ufloat(sum.irradiance.r, 6, dimmer_blend_exponent) |
-                                dimmer_encode_ufloat(sum.irradiance.g, 6, dimmer_blend_exponent) << 11 |
-                                dimmer_encode_ufloat(sum.irradiance.b, 5, dimmer_blend_exponent) << 22
-                          : dimmer_encode_e5b9g9r9(sum.irradiance, dimmer_blend_exponent);
+    uint irradiance = dimmer_encode_light(sum.irradiance, format);
     // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
     bool usable = sum.l >= dimmer_blend_luminance_min && sum.l <= dimmer_blend_luminance_max;
     precise float inverse = 1.0 / (usable ? sum.l : 1.0);

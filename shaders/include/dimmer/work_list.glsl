@@ -21,7 +21,7 @@ struct WorkItem {
 
 // A contribution of a cluster that is on.
 struct WorkTerm {
-    DIMMER_UINT slot;                    // its place among all of the cluster's contributions
+    DIMMER_UINT term;                    // of the pack; on the device: the cluster's first record of it
     float weight_r, weight_g, weight_b;  // times weightScale() of texel.h
 };
 
@@ -29,8 +29,8 @@ struct WorkTerm {
 struct BatchPlace {
     DIMMER_UINT first_receiver;
     DIMMER_UINT receiver_count;
-    DIMMER_UINT offset;        // of the batch within its cluster, in receivers
-    DIMMER_UINT first_record;  // where, in the table of first records, those of its cluster's contributions begin
+    DIMMER_UINT offset;  // of the batch within its cluster, in receivers
+    DIMMER_UINT unused;
 };
 
 #undef DIMMER_UINT

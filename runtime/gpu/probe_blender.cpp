@@ -1,0 +1,193 @@
+#include <gpu/probe_blender.h>
+
+#include <fmt/format.h>
+#include <format/probe.h>
+#include <gpu/table_upload.h>
+#include <gpu/vk_result.h>
+#include <gpu/vk_struct.h>
+#include <spirv/blend_probes_comp.h>
+
+#include <cstring>
+
+namespace dimmer {
+namespace {
+
+constexpr VkFormat wide_format = VK_FORMAT_R32G32B32A32_UINT;
+constexpr uint32_t workgroup_size = 64, lanes_per_item = 16, items_per_workgroup = workgroup_size / lanes_per_item;
+
+struct DispatchConstants {
+    uint32_t first_item, item_count;
+};
+
+Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
+    if (!made) return std::unexpected(std::move(made.error()));
+    slot = std::move(*made);
+    return {};
+}
+
+// What the device reads as record i: the base of every receiver first, then the contributions.
+ProbeRecord recordAt(const PackData& data, uint32_t i) {
+    const auto receivers = static_cast<uint32_t>(data.probes.numbers.size());
+    return canonicalProbe(data.color_format, i < receivers ? data.probes.base[data.probes.numbers[i]]
+                                                           : data.probes.payload[i - receivers]);
+}
+
+// `count` words of each record, from `first` on, as a stream of their own.
+template <size_t first, size_t count>
+Expected<TexelBuffer> uploadStream(const VulkanContext& vulkan, Transfer& transfer, const PackData& data,
+                                   VkFormat format) {
+    const std::vector<Run> all = {
+        {0, 0, static_cast<uint32_t>(data.probes.numbers.size() + data.probes.payload.size())}};
+    using Words = std::array<uint32_t, count>;
+    return uploadTable(vulkan, transfer, all[0].count * sizeof(Words), format, fillFrom(all, [&](uint32_t i) {
+                           const ProbeRecord record = recordAt(data, i);
+                           Words words;
+                           std::memcpy(&words, reinterpret_cast<const uint32_t*>(&record) + first, sizeof(words));
+                           return words;
+                       }));
+}
+
+void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written, VkPipelineStageFlags to,
+             VkAccessFlags used) {
+    auto info = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+    info.srcAccessMask = written;
+    info.dstAccessMask = used;
+    vkCmdPipelineBarrier(commands, from, to, 0, 1, &info, 0, nullptr, 0, nullptr);
+}
+
+Expected<void> checkLimits(const VulkanContext& vulkan, const ProbeData& probes) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const uint64_t records = probes.numbers.size() + probes.payload.size();
+    const uint64_t probe_bytes = probes.base.size() * sizeof(ProbeRecord);
+    if (records <= properties.limits.maxTexelBufferElements && probe_bytes <= properties.limits.maxStorageBufferRange)
+        return {};
+    return fail(ErrorCode::Unsupported,
+                fmt::format("The pack's {} light probes with {} records exceed what this Vulkan device reads as one "
+                            "buffer. Cook with wider grids or a higher activity threshold.",
+                            probes.base.size(), records));
+}
+
+}  // namespace
+
+Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
+                                            uint32_t set_count, Transfer& transfer) {
+    DIMMER_TRY(checkLimits(vulkan, data.probes));
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    ProbeBlender blender;
+    blender.data_ = &data.probes;
+    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    DIMMER_TRY(blender.createTables(vulkan, data, transfer));
+    for (uint32_t i = 0; i < set_count; ++i) DIMMER_TRY(blender.createSet(vulkan, data, planner, transfer));
+    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner));
+    return blender;
+}
+
+Expected<void> ProbeBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
+    std::vector<BatchPlace> places;
+    for (const Cluster& cluster : data.probes.clusters)
+        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b) {
+            const Batch& batch = data.probes.batches[b];
+            places.push_back(
+                {batch.first_receiver, batch.receiver_count, batch.first_receiver - cluster.first_receiver, 0});
+        }
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places, wide_format), places_));
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, data.probes.numbers, VK_FORMAT_R32_UINT), numbers_));
+    DIMMER_TRY(keep(uploadStream<0, 4>(vulkan, transfer, data, wide_format), records_16_));
+    DIMMER_TRY(keep(uploadStream<4, 2>(vulkan, transfer, data, VK_FORMAT_R32G32_UINT), records_8_));
+    return keep(uploadStream<6, 1>(vulkan, transfer, data, VK_FORMAT_R32_UINT), records_4_);
+}
+
+Expected<void> ProbeBlender::createSet(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
+                                       Transfer& transfer) {
+    Set set;
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
+                    set.items));
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
+                    set.terms));
+    auto probes = createBuffer(
+        vulkan, data.probes.base.size() * sizeof(ProbeRecord),
+        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+        MemoryUse::Device);
+    if (!probes) return std::unexpected(std::move(probes.error()));
+    set.probes = std::move(*probes);
+    const std::vector<Run> all = {{0, 0, 7 * static_cast<uint32_t>(data.probes.base.size())}};
+    DIMMER_TRY(transfer.upload(set.probes.buffer.get(), set.probes.size_bytes, fillFrom(all, [&](uint32_t word) {
+                                   const ProbeRecord record =
+                                       canonicalProbe(data.color_format, data.probes.base[word / 7]);
+                                   return word % 7 == 0 ? record.light : record.bands[word % 7 - 1];
+                               })));
+    sets_.push_back(std::move(set));
+    return {};
+}
+
+Expected<void> ProbeBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner) {
+    std::vector<Specialisation> pipelines;
+    for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
+        pipelines.push_back({group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
+                             static_cast<uint32_t>(format)});
+    std::vector<KernelBinding> bindings;
+    for (const Set& set : sets_) {
+        const TexelBuffer* const tables[] = {&places_,    &numbers_,  &records_16_, &records_8_,
+                                             &records_4_, &set.items, &set.terms};
+        for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
+        bindings.push_back(KernelBinding::ofBuffer(set.probes.buffer.get()));
+    }
+    auto kernel = Kernel::create(device, spirv::blend_probes_comp, bindings, sizeof(DispatchConstants), pipelines,
+                                 static_cast<uint32_t>(sets_.size()));
+    if (!kernel) return std::unexpected(std::move(kernel.error()));
+    kernel_ = std::move(*kernel);
+    return {};
+}
+
+void ProbeBlender::write(const Planner& planner, uint32_t set) {
+    const WorkList& work = planner.work();
+    std::memcpy(sets_[set].items.buffer.mapped, work.items.data(), work.items.size_bytes());
+    auto* terms = reinterpret_cast<WorkTerm*>(sets_[set].terms.buffer.mapped);
+    const auto receivers = static_cast<uint32_t>(data_->numbers.size());
+    for (const WorkTerm& term : work.terms)
+        *terms++ = {receivers + data_->terms[term.term].first_record, term.weight_r, term.weight_g, term.weight_b};
+}
+
+uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t set,
+                                VkPipelineStageFlags stages) const {
+    constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
+    barrier(commands, stages | compute, VK_ACCESS_SHADER_WRITE_BIT, compute, VK_ACCESS_SHADER_WRITE_BIT);
+    uint32_t dispatches = 0;
+    for (uint32_t i = 0; i < work_group_count; ++i) {
+        const WorkGroup& group = planner.work().groups[i];
+        if (group.item_count == 0) continue;
+        kernel_.bind(commands, i, set);
+        kernel_.push(commands, DispatchConstants{group.first_item, group.item_count});
+        dispatchRows(commands, (group.item_count + items_per_workgroup - 1) / items_per_workgroup, groups_x_max_);
+        ++dispatches;
+    }
+    barrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, stages | VK_PIPELINE_STAGE_TRANSFER_BIT,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT);
+    return dispatches;
+}
+
+uint64_t ProbeBlender::deviceBytes() const {
+    uint64_t bytes = bytesOf({&places_, &numbers_, &records_16_, &records_8_, &records_4_});
+    for (const Set& set : sets_) bytes += bytesOf({&set.items, &set.terms}) + set.probes.size_bytes;
+    return bytes;
+}
+
+Expected<std::vector<uint32_t>> ProbeBlender::read(uint32_t set, Transfer& readback) const {
+    std::vector<uint32_t> words(sets_[set].probes.size_bytes / sizeof(uint32_t));
+    const VkDeviceSize bytes = sets_[set].probes.size_bytes;
+    for (VkDeviceSize offset = 0; offset < bytes; offset += Transfer::staging_bytes) {
+        const VkBufferCopy region{
+            .srcOffset = offset, .dstOffset = 0, .size = std::min(Transfer::staging_bytes, bytes - offset)};
+        DIMMER_TRY(readback.run([&](VkCommandBuffer commands) {
+            vkCmdCopyBuffer(commands, probes(set), readback.staging().buffer.get(), 1, &region);
+            barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
+                    VK_ACCESS_HOST_READ_BIT);
+        }));
+        std::memcpy(reinterpret_cast<std::byte*>(words.data()) + offset, readback.staging().mapped, region.size);
+    }
+    return words;
+}
+
+}  // namespace dimmer

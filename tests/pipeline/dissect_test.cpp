@@ -1,0 +1,100 @@
+// Causes of error: each made large or taken away by the setting that governs it.
+#include <pipeline/dissect.h>
+#include <pipeline/small_level.h>
+#include <pipeline/verify.h>
+
+namespace dimmer::cook::test {
+namespace {
+
+// Two rooms with lamps whose direct light a renderer would draw: all that is stored is gathered.
+Scene cells() {
+    LevelFile level = twoCells();
+    for (json& node : level.document["nodes"])
+        if (node.contains("extras")) node["extras"].erase("dimmer_bake");
+    return *level.import();
+}
+
+Profile fineProfile() {
+    Profile profile = smallProfile();
+    profile.texels_per_metre = 6;
+    profile.threshold = 0;
+    profile.draft = {.samples_per_texel = 8, .series_rays = 64, .rays = 512, .emitter_samples = 2, .tolerance = 0.001f};
+    return profile;
+}
+
+Expected<VerifyReport> dissected(const Profile& profile, bool formats = false) {
+    const Scene scene = cells();
+    SilentProgress progress;
+    CookStats stats;
+    auto data = cookScene(scene, profile, "draft", progress, stats);
+    if (!data) return std::unexpected(data.error());
+    const auto pack = Pack::fromData(std::move(*data));
+    if (!pack) return std::unexpected(pack.error());
+    return verify(scene, *pack,
+                  {.state = "", .points = 50, .paths_max = 2048, .sets = false, .causes = true, .formats = formats},
+                  progress);
+}
+
+TEST(Dissect, EachCauseFollowsItsSetting) {
+    const auto fine = dissected(fineProfile());
+    ASSERT_TRUE(fine) << fine.error().message;
+    Profile coarse = fineProfile(), noisy = fineProfile(), sparse = fineProfile();
+    coarse.texels_per_metre = 1;
+    noisy.draft.rays = 16;
+    sparse.threshold = 1;
+    const auto with_coarse = dissected(coarse), with_noise = dissected(noisy), with_threshold = dissected(sparse);
+    ASSERT_TRUE(with_coarse && with_noise && with_threshold);
+    const auto cause = [](const auto& report, const char* name) { return report->causes.at(name); };
+    EXPECT_EQ(cause(fine, "activity_threshold"), 0);
+    EXPECT_GT(cause(with_threshold, "activity_threshold"), 0.001);
+    // 16 rays against 512: the root of 32 is 5.7, and rays of a sequence do better than that.
+    EXPECT_GT(cause(with_noise, "noise"), 4 * cause(fine, "noise"));
+    EXPECT_LT(cause(fine, "noise"), 0.02);
+    // What interpolation misses goes with the square of the texel's side where light is smooth, with the side at edges.
+    // Six times the side; the noise of two gathers hides most of what is left at the fine one.
+    EXPECT_GT(cause(with_coarse, "texel_size"), 2 * cause(fine, "texel_size"));
+    EXPECT_LT(cause(fine, "series_expansion"), 0.02);
+    // The steps lead from the truth to the pack: the whole error is at most their sum.
+    for (const auto* report : {&fine, &with_coarse, &with_noise, &with_threshold}) {
+        double sum = 0;
+        for (const char* name : {"series_expansion", "texel_size", "activity_threshold", "noise", "colour_format"})
+            sum += cause(*report, name);
+        // 2 % for the noise of 2,048 paths, which every step leaves out.
+        EXPECT_LE((*report)->surface.mean, sum + 0.02);
+    }
+}
+
+TEST(Dissect, FinerFormatsAreMeasuredAsFiner) {
+    const auto report = dissected(fineProfile(), true);
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_EQ(report->formats.size(), 12u);
+    const auto mean = [&](ColorFormat format, DirectionModel model, uint32_t sets) {
+        for (const FormatError& f : report->formats)
+            if (f.color_format == format && f.direction_model == model && f.sets == sets) return f.mean;
+        ADD_FAILURE();
+        return 0.0;
+    };
+    for (const uint32_t sets : {1u, 3u, 8u}) {
+        EXPECT_LT(mean(ColorFormat::E5B9G9R9, DirectionModel::Ahd, sets),
+                  mean(ColorFormat::R11G11B10F, DirectionModel::Ahd, sets));
+        // Light of a closed room has no edge within 60 degrees: the model is within a few per cent.
+        EXPECT_LT(mean(ColorFormat::E5B9G9R9, DirectionModel::Ahd, sets), 0.03);
+    }
+}
+
+TEST(Dissect, PacksThatNoLevelWasCookedIntoAreRefused) {
+    const Scene scene = cells();
+    SilentProgress progress;
+    CookStats stats;
+    auto data = cookScene(scene, smallProfile(), "draft", progress, stats);
+    ASSERT_TRUE(data);
+    PackData unnamed = *data;
+    unnamed.settings_json = "{}";
+    const VerifyOptions options{.state = "", .points = 10, .paths_max = 64, .sets = false, .causes = true};
+    const auto foreign = verify(scene, *Pack::fromData(std::move(unnamed)), options, progress);
+    ASSERT_FALSE(foreign);
+    EXPECT_NE(foreign.error().message.find("no quality"), std::string::npos) << foreign.error().message;
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

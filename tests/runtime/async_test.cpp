@@ -1,0 +1,183 @@
+// Two sets of pages, limits on the device, and a queue of the runtime's own; all under synchronisation validation.
+// lavapipe has one queue: the path of the own queue runs, but nothing here proves what crosses queues.
+#include <dimmer/cpu_runtime.h>
+#include <dimmer/runtime.h>
+
+#include "gpu_fixture.h"
+#include "pages.h"
+
+namespace dimmer {
+namespace {
+
+using test::packOf;
+
+class AsyncTest : public test::GpuTest {
+   protected:
+    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
+        return runtimeOn(device().context(), pack, options);
+    }
+    static Runtime runtimeOn(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {}) {
+        auto runtime = Runtime::create(vulkan, pack, options);
+        if (!runtime) throw std::runtime_error(runtime.error().message);
+        return std::move(*runtime);
+    }
+    static void expectEqualPages(Runtime& gpu, const CpuRuntime& cpu) {
+        const auto pages = gpu.readPages();
+        ASSERT_TRUE(pages) << pages.error().message;
+        ASSERT_TRUE(std::ranges::equal(pages->irradiance, cpu.irradiancePages()));
+        ASSERT_TRUE(std::ranges::equal(pages->direction, cpu.directionPages()));
+    }
+};
+
+TEST_F(AsyncTest, TwoSetsOfPagesTakeTurnsAndBothCatchUp) {
+    const Pack pack = packOf(test::randomPack(61));
+    for (const UpdateMode mode : {UpdateMode::WorkList, UpdateMode::PerCombination}) {
+        Runtime gpu = runtimeOf(pack, {.mode = mode, .buffering = Buffering::Double});
+        CpuRuntime cpu(pack);
+        test::Random random(61);
+        uint32_t shown = gpu.pageSet();
+        for (int step = 0; step < 20; ++step) {
+            ASSERT_TRUE(gpu.submit());
+            EXPECT_NE(gpu.pageSet(), shown);
+            shown = gpu.pageSet();
+            cpu.update();
+            expectEqualPages(gpu, cpu);
+            // One element at a time: the other set of pages lacks the change before as well.
+            test::setElement(gpu, static_cast<uint32_t>(step % 12), static_cast<float>(step + 1) / 32);
+            test::setElement(cpu, static_cast<uint32_t>(step % 12), static_cast<float>(step + 1) / 32);
+        }
+    }
+}
+
+TEST_F(AsyncTest, ASecondSetOfPagesKeepsTheOldLightMeanwhile) {
+    const Pack pack = packOf(test::randomPack(62, {.doors = 0}));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.submit());
+    const LightmapImages old = gpu.images();
+    ASSERT_TRUE(gpu.apply("all=0"));
+    ASSERT_TRUE(gpu.submit());
+    EXPECT_NE(gpu.images().irradiance, old.irradiance);
+    EXPECT_EQ(gpu.images(gpu.pageSet() ^ 1).irradiance, old.irradiance);
+    const uint64_t value = gpu.semaphoreValue();
+    ASSERT_TRUE(gpu.submit());
+    EXPECT_EQ(gpu.semaphoreValue(), value) << "nothing changed, though the other set of pages is a step behind";
+    // Back to a state that the other set holds already: it is shown without any work.
+    ASSERT_TRUE(gpu.apply("all=1"));
+    EXPECT_EQ(gpu.submit()->dispatches, 0u);
+    EXPECT_EQ(gpu.semaphoreValue(), value);
+    EXPECT_EQ(gpu.images().irradiance, old.irradiance);
+    CpuRuntime cpu(pack);
+    cpu.update();
+    expectEqualPages(gpu, cpu);
+}
+
+TEST_F(AsyncTest, ModesThatWriteEverythingHaveOneSetOfPages) {
+    for (const UpdateMode mode : {UpdateMode::Gather, UpdateMode::Scatter}) {
+        const auto refused = Runtime::create(device().context(), packOf(test::randomPack(1)),
+                                             {.mode = mode, .buffering = Buffering::Double});
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    }
+}
+
+TEST_F(AsyncTest, ABudgetConvergesInPlace) {
+    const Pack pack = packOf(test::randomPack(63));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    ASSERT_TRUE(gpu.setLimits({.receivers_max = 500}) && cpu.setLimits({.receivers_max = 500}));
+    test::Random random(63);
+    for (int round = 0; round < 3; ++round) {
+        for (;;) {
+            const auto stats = gpu.submit();
+            ASSERT_TRUE(stats);
+            cpu.update();
+            expectEqualPages(gpu, cpu);  // at every step: both leave the same for later
+            if (stats->batches == 0) break;
+            EXPECT_LE(stats->receivers, 500u);
+        }
+        CpuRuntime fresh(pack);
+        test::copyState(gpu, fresh);
+        fresh.update();
+        expectEqualPages(gpu, fresh);
+        const std::string state = test::randomState(pack.data(), random);
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+    }
+}
+
+// With two sets of pages a state is shown when all of it is there, even while the next one comes in.
+TEST_F(AsyncTest, ABudgetWithTwoSetsOfPagesShowsWholeStates) {
+    const Pack pack = packOf(test::randomPack(64, {.doors = 0}));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.setLimits({.receivers_max = 500}));
+    CpuRuntime cpu(pack);  // what is shown: the base
+    uint32_t shown = gpu.pageSet(), states = 0;
+    CpuRuntime begun(pack);  // what is being written: the state at its first update
+    for (int frame = 0; frame < 60; ++frame) {
+        const float weight = static_cast<float>(frame % 7) / 8;
+        ASSERT_TRUE(gpu.setWeight(LightSet{3}, weight));
+        const bool begins = frame == 0 || gpu.pageSet() != shown;
+        if (begins) {
+            shown = gpu.pageSet();
+            test::copyState(gpu, begun);
+        }
+        ASSERT_TRUE(gpu.submit());
+        if (gpu.pageSet() != shown) {
+            begun.update();
+            expectEqualPages(gpu, begun);
+            ++states;
+        }
+    }
+    EXPECT_GT(states, 5u);
+}
+
+TEST_F(AsyncTest, TheOwnQueueWaitsForAndSignalsSemaphores) {
+    VulkanContext vulkan = device().context();
+    vulkan.compute_queue = vulkan.queue;
+    vulkan.compute_queue_family = vulkan.queue_family;
+    const Pack pack = packOf(test::randomPack(65));
+    Runtime gpu = runtimeOn(vulkan, pack, {.buffering = Buffering::Double});
+    CpuRuntime cpu(pack);
+
+    VkSemaphoreTypeCreateInfo type{VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO, nullptr, VK_SEMAPHORE_TYPE_TIMELINE,
+                                   0};
+    const VkSemaphoreCreateInfo info{VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO, &type, 0};
+    VkSemaphore frames = VK_NULL_HANDLE;
+    ASSERT_EQ(vkCreateSemaphore(vulkan.device, &info, nullptr, &frames), VK_SUCCESS);
+    for (uint64_t frame = 1; frame <= 4; ++frame) {
+        test::setElement(gpu, 0, static_cast<float>(frame) / 8);
+        test::setElement(cpu, 0, static_cast<float>(frame) / 8);
+        const uint64_t before = gpu.semaphoreValue();
+        ASSERT_TRUE(gpu.submit({frames, frame}));
+        EXPECT_EQ(gpu.semaphoreValue(), before + 1);
+        uint64_t done = 0;
+        vkGetSemaphoreCounterValue(vulkan.device, gpu.semaphore(), &done);
+        EXPECT_EQ(done, before) << "the frame has not finished, so nothing may have been written";
+        const VkSemaphoreSignalInfo signal{VK_STRUCTURE_TYPE_SEMAPHORE_SIGNAL_INFO, nullptr, frames, frame};
+        ASSERT_EQ(vkSignalSemaphore(vulkan.device, &signal), VK_SUCCESS);
+        EXPECT_TRUE(gpu.wait());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
+    vkDestroySemaphore(vulkan.device, frames, nullptr);
+}
+
+// Where the device has a second queue, everything once more on it; elsewhere the one queue does.
+TEST_F(AsyncTest, WorksOnADeviceThatWasAskedForASecondQueue) {
+    auto own = HeadlessDevice::create({.validation = true, .compute_queue = true});
+    ASSERT_TRUE(own) << own.error().message;
+    const Pack pack = packOf(test::randomPack(66));
+    {
+        Runtime gpu = runtimeOn(own->context(), pack, {.buffering = Buffering::Double});
+        CpuRuntime cpu(pack);
+        for (const char* state : {"set0=0.5", "all=0,set3=1", "door:door1=0.5"}) {
+            ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+            ASSERT_TRUE(gpu.submit());
+            cpu.update();
+            expectEqualPages(gpu, cpu);
+        }
+    }
+    EXPECT_EQ(own->validationMessages(), std::vector<std::string>());
+}
+
+}  // namespace
+}  // namespace dimmer
