@@ -6,6 +6,7 @@
 #include <gpu/vk_struct.h>
 
 #include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
 
 namespace dimmer::sample {
 namespace {
@@ -222,12 +223,13 @@ void LevelRenderer::recordMeshes(VkCommandBuffer commands, const CameraPose& cam
     vkCmdBindIndexBuffer(commands, indices_.buffer.get(), 0, VK_INDEX_TYPE_UINT32);
 
     DrawConstants constants{};
-    constants.clip_from_world =
+    const glm::mat4 clip_from_world =
         clipFromWorld(camera, static_cast<float>(extent_.width) / static_cast<float>(extent_.height));
     constants.exposure = pack_.exposure();
     constants.direction_model = static_cast<uint32_t>(pack_.directionModel());
     for (size_t i = 0; i < draws_.size(); ++i) {
         const Mesh& mesh = pack_.meshes()[i];
+        constants.clip_from_world = glm::translate(clip_from_world, leaves_.offset(i, lights));
         constants.reflectance = toVec3(mesh.reflectance);
         constants.page = static_cast<float>(mesh.page);
         constants.emission_cd_m2 = emission(mesh, lights);

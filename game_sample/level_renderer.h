@@ -2,6 +2,7 @@
 #pragma once
 
 #include "camera.h"
+#include "leaf_motion.h"
 #include "level_pipeline.h"
 
 #include <dimmer/runtime.h>
@@ -43,7 +44,7 @@ class LevelRenderer {
     };
 
     LevelRenderer(const VulkanContext& vulkan, const Pack& pack, VkExtent2D extent)
-        : vulkan_(vulkan), pack_(pack), extent_(extent) {}
+        : vulkan_(vulkan), pack_(pack), leaves_(pack), extent_(extent) {}
     Expected<void> createGeometry();
     Expected<void> createTargets();
     Expected<void> createRenderPass();
@@ -54,6 +55,7 @@ class LevelRenderer {
 
     VulkanContext vulkan_;
     Pack pack_;
+    LeafMotion leaves_;
     VkExtent2D extent_;
     std::vector<Draw> draws_;  // one per mesh of the pack
     GpuBuffer vertices_, indices_, readback_;

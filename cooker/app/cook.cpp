@@ -49,6 +49,12 @@ void printTable(const CookResult& result, const PackCost& cost, const Profile& p
                result.stats.bounces, static_cast<double>(result.stats.rays) / 1e6, humanBytes(result.stats.peak_bytes));
 }
 
+nlohmann::ordered_json suggestions(const CookStats& stats) {
+    auto list = nlohmann::ordered_json::array();
+    for (const auto& [first, second] : stats.suggested_combinations) list.push_back({first, second});
+    return list;
+}
+
 nlohmann::ordered_json toJson(const CookResult& result) {
     nlohmann::ordered_json json;
     json["seconds"] = result.stats.seconds;
@@ -60,6 +66,7 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     json["peak_bytes"] = result.stats.peak_bytes;
     json["file_bytes"] = result.file_bytes;
     json["warnings"] = result.stats.warnings;
+    if (!result.stats.suggested_combinations.empty()) json["dimmer_combinations"] = suggestions(result.stats);
     return json;
 }
 
@@ -76,6 +83,8 @@ int run(const Arguments& a) {
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
+    if (a.json != "-" && a.options.suggest_combinations)
+        fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
 }
 
@@ -96,6 +105,9 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
+    c->add_flag(
+        "--suggest-combinations", a->options.suggest_combinations,
+        "measure which pairs of doors lose light that needs both, warn, and print them for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
     c->add_flag_callback(

@@ -89,6 +89,7 @@ DoorPaths::DoorPaths(const Scene& scene)
             term_of_[p * group_count_ + g] = static_cast<uint32_t>(terms_.size());
             terms_.push_back(makeTerm(g, paths_[p]));
             path_of_.push_back(p);
+            only_door_.push_back(paths_[p].size() == 1 ? paths_[p][0] / 2 : no_door);
         }
 }
 

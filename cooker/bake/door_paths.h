@@ -18,6 +18,7 @@ namespace dimmer::cook {
 inline constexpr uint32_t free_path = 0;  // touches no door
 inline constexpr uint32_t no_path = UINT32_MAX;
 inline constexpr uint32_t no_term = UINT32_MAX;
+inline constexpr uint32_t no_door = UINT32_MAX;
 
 // Light group 0 is all always-on light; group 1 + s is light set s.
 inline constexpr uint32_t always_group = 0;
@@ -66,6 +67,8 @@ class DoorPaths {
     uint32_t term(uint32_t group, uint32_t path) const {
         return path == no_path ? no_term : term_of_[path * group_count_ + group];
     }
+    // The one door that a term is about; no_door where there are none or several.
+    uint32_t onlyDoor(uint32_t term) const { return only_door_[term]; }
     // What light of `term` becomes along a ray of `path` to a receiver that is there under `own`, whose terms do not
     // name that condition; no_term where it is not kept or cannot be.
     uint32_t moved(uint32_t term, uint32_t path, uint32_t own) const;
@@ -80,6 +83,7 @@ class DoorPaths {
     std::vector<uint32_t> joined_;              // path, path
     std::vector<uint32_t> term_of_;             // path, group
     std::vector<uint32_t> path_of_;             // per term
+    std::vector<uint32_t> only_door_;           // per term
     std::vector<Term> terms_;
 };
 

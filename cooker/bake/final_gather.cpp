@@ -42,6 +42,16 @@ float FinalGather::State::varianceOfMean() const {
     return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
 }
 
+// At the doors that the terms are about.
+void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options) {
+    aims_.clear();
+    for (uint32_t t : terms) {
+        const uint32_t door = options.aim_at_doors ? gatherer_.paths().onlyDoor(t) : no_door;
+        if (door != no_door && std::ranges::find(aims_, door, &DoorAim::door) == aims_.end())
+            aims_.push_back(gatherer_.aimAt(from, door));
+    }
+}
+
 void FinalGather::want(uint32_t term, bool wanted) {
     round_.setWanted(term, wanted);
     wanted_in_group_[gatherer_.paths().terms()[term].group] += wanted ? 1u : UINT32_MAX;
@@ -53,6 +63,7 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
         state_[t] = {};
         want(t, true);
     }
+    aim(from, terms, options);
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
     size_t waiting = terms.size();
     uint64_t traced = 0;
@@ -63,8 +74,8 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
                           .seed = options.seed,
                           .first_ray = r * rays_per_round,
                           .wanted_in_group = wanted_in_group_},
-                         &outgoing, round_, nullptr);
-        traced += rays_per_round;
+                         &outgoing, round_, nullptr, aims_);
+        traced += rays_per_round + aims_.size() * aimed_rays;
         for (uint32_t t : terms) {
             State& s = state_[t];
             if (s.done) continue;

@@ -13,6 +13,7 @@ struct FinalGatherOptions {
     uint32_t emitter_samples = 8;  // per round of rays
     float noise_max = 0;           // 95 % interval, relative to irradiance + floor; 0: always rays_max
     uint32_t seed = 0;
+    bool aim_at_doors = true;          // rays towards the doors of the terms besides; off, for measuring against
     std::span<const float> floor_lux;  // per term: light below this need not be exact to a share of itself
 };
 
@@ -49,9 +50,11 @@ class FinalGather {
         void add(const Gathered& round);
         float varianceOfMean() const;
     };
+    void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
     void want(uint32_t term, bool wanted);
 
     const Gatherer& gatherer_;
+    std::vector<DoorAim> aims_;
     TermAccumulator<Gathered> round_;  // wants the terms that are not done
     std::vector<State> state_;
     std::vector<uint32_t> wanted_in_group_;

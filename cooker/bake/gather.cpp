@@ -4,6 +4,7 @@
 #include <bake/sampling.h>
 
 #include <algorithm>
+#include <array>
 
 namespace dimmer::cook {
 namespace {
@@ -38,35 +39,109 @@ struct Gatherer::Ray {
     const SparseLight* outgoing;
     TermAccumulator<Gathered>& sum;
     GatherLinks* links;
-    uint32_t i;  // in this gather
+    std::span<const DoorAim> aims;
+    const DoorAim* aim;  // whose ray this is; null: a cosine ray
+    uint32_t i, point;   // in this gather; of the receiver
     glm::vec3 origin, world, tangent;
-    float lux_per_radiance;
+    // By door of the first aims, once a term has asked: many terms are about the same door.
+    mutable std::array<float, 8> share_of_aim{};
 };
 
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                      TermAccumulator<Gathered>& sum, GatherLinks* links) const {
+                      TermAccumulator<Gathered>& sum, GatherLinks* links, std::span<const DoorAim> aims) const {
     const uint32_t seed = hash(options.seed, from.id);
-    const bool sky = rays_.scene().sky_radiance_cd_m2 != glm::vec3(0);
-    const float lux_per_radiance = pi / static_cast<float>(options.rays);
     for (uint32_t i = 0; i < options.rays; ++i) {
         const uint32_t index = options.first_ray + i;
-        const SamplePoint& origin = from.points[index % from.points.size()];
+        const auto point = static_cast<uint32_t>(index % from.points.size());
+        const SamplePoint& origin = from.points[point];
         const TangentFrame& frame = unwrap_.frames[origin.face];
         const glm::vec3 d = cosineDirection(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const Ray ray{from, options, outgoing, sum, links, i, origin.position_m, world, d, lux_per_radiance};
-        const auto hit = rays_.nearest(origin.position_m, world, far_away_m, seed + index, Surfaces::Walls);
         if (links) links->hits[i] = no_index;
-        const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
-        if (path == no_path) continue;
-        if (hit) {
-            take(ray, *hit, path);
-        } else if (const uint32_t term = paths_.term(always_group, path); sky && term != no_term && sum.wants(term)) {
-            sum[term].add(missed(options, world, d.z) * lux_per_radiance, d);
-        }
+        follow({from, options, outgoing, sum, links, aims, nullptr, i, point, origin.position_m, world, d, {}},
+               seed + index);
     }
+    for (size_t a = 0; a < aims.size(); ++a) gatherAimed(from, options, outgoing, sum, aims, a);
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
     if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
+}
+
+DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t door) const {
+    DoorAim aim{door, {}};
+    for (const SamplePoint& p : from.points)
+        aim.from_point.emplace_back(guides_.boxes(door), p.position_m, unwrap_.frames[p.face].normal);
+    return aim;
+}
+
+void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
+                           TermAccumulator<Gathered>& sum, std::span<const DoorAim> aims, size_t a) const {
+    const DoorAim& aim = aims[a];
+    // Seeded by the door alone: what else is aimed at does not change its noise.
+    const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), aim.door);
+    for (uint32_t i = 0; i < aimed_rays; ++i) {
+        // The rays of all rounds are one sequence.
+        const uint32_t index = options.first_ray * aimed_rays / options.rays + i;
+        const auto point = static_cast<uint32_t>(index % from.points.size());
+        const SamplePoint& origin = from.points[point];
+        const Guide& guide = aim.from_point[point];
+        if (guide.empty()) continue;
+        const glm::vec3 u = sequence3d(index, seed);
+        const glm::vec3 world = guide.sample(u.z, {u.x, u.y});
+        const glm::vec3 d = toTangent(unwrap_.frames[origin.face], world);
+        if (!(d.z > 0)) continue;
+        follow({from,
+                options,
+                outgoing,
+                sum,
+                nullptr,
+                aims,
+                &aim,
+                options.rays + i,
+                point,
+                origin.position_m,
+                world,
+                d,
+                {}},
+               seed + index);
+    }
+}
+
+// Traces a ray and takes what it finds.
+void Gatherer::follow(const Ray& ray, uint32_t seed) const {
+    const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls);
+    const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
+    if (path == no_path) return;
+    if (hit)
+        take(ray, *hit, path);
+    else
+        takeSky(ray, path);
+}
+
+// From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
+// have found it there.
+float Gatherer::shareOf(const Ray& ray, uint32_t term) const {
+    const float alone = pi / static_cast<float>(ray.options.rays);
+    const uint32_t door = ray.aims.empty() ? no_door : paths_.onlyDoor(term);
+    if (ray.aim && ray.aim->door != door) return 0;
+    if (door == no_door) return alone;
+    const auto aim = std::ranges::find(ray.aims, door, &DoorAim::door);
+    if (aim == ray.aims.end() || aim->from_point[ray.point].empty()) return alone;
+    const auto index = static_cast<size_t>(aim - ray.aims.begin());
+    if (index < ray.share_of_aim.size() && ray.share_of_aim[index] > 0) return ray.share_of_aim[index];
+    const float by_cosine = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
+    const float by_aim = static_cast<float>(aimed_rays) * aim->from_point[ray.point].pdf(ray.world);
+    const float share = ray.tangent.z / (by_cosine + by_aim);
+    if (index < ray.share_of_aim.size()) ray.share_of_aim[index] = share;
+    return share;
+}
+
+void Gatherer::takeSky(const Ray& ray, uint32_t path) const {
+    const uint32_t term = paths_.term(always_group, path);
+    if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
+    // An image sky has rays of its own; see sampleSky.
+    if (ray.aim && !sky_.empty()) return;
+    const float share = sky_.empty() ? shareOf(ray, term) : pi / static_cast<float>(ray.options.rays);
+    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.tangent.z) * share, ray.tangent);
 }
 
 // Takes what the leaves along a ray send back. Returns the path on which it goes on behind them.
@@ -93,13 +168,16 @@ uint32_t Gatherer::throughLeaves(const Ray& ray, float distance_m) const {
 
 // Takes the light of the surface at a ray's end.
 void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
-    if (const Emitter* e = emitters_.emitterOf(hit.triangle); e && (!hit.back || e->double_sided)) {
+    // Emitters have rays of their own; see sampleEmitters.
+    if (const Emitter* e = emitters_.emitterOf(hit.triangle); !ray.aim && e && (!hit.back || e->double_sided)) {
         const float cos_emitter = std::abs(glm::dot(ray.world, e->normal));
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
         const float by_hit = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
         if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
-            ray.sum[term].add(e->radiance_cd_m2 * (ray.lux_per_radiance * by_hit / (by_hit + by_area)), ray.tangent);
+            ray.sum[term].add(
+                e->radiance_cd_m2 * (pi / static_cast<float>(ray.options.rays) * by_hit / (by_hit + by_area)),
+                ray.tangent);
     }
     const uint32_t found = receiverOf(unwrap_, texels_, hit);
     if (found == no_index) return;
@@ -109,7 +187,8 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
     const bool as_it_is = path == free_path && ray.from.condition == no_condition;
     for (const TermLight& light : ray.outgoing->row(found)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
-        if (term != no_term && ray.sum.wants(term)) ray.sum[term].add(light.value * ray.lux_per_radiance, ray.tangent);
+        if (term == no_term || !ray.sum.wants(term)) continue;
+        if (const float share = shareOf(ray, term); share > 0) ray.sum[term].add(light.value * share, ray.tangent);
     }
 }
 

@@ -3,6 +3,7 @@
 // meets a door's leaf ends there and goes on as well, so that one ray serves the open and the closed door.
 #pragma once
 
+#include <bake/door_guides.h>
 #include <bake/emitters.h>
 #include <bake/sky.h>
 #include <bake/sparse_light.h>
@@ -45,6 +46,12 @@ struct GatherOptions {
     std::span<const uint32_t> wanted_in_group;
 };
 
+// Rays towards one door and what it lights, for the terms with that door alone.
+struct DoorAim {
+    uint32_t door = 0;
+    std::vector<Guide> from_point;  // one per point of the receiver
+};
+
 // Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
 struct GatherFrom {
     std::span<const SamplePoint> points;
@@ -63,19 +70,30 @@ struct GatherLinks {
     std::vector<uint32_t> doors;              // that rays met, once for each ray
 };
 
+// Rays per aim of a gather: an eighth of a round's.
+inline constexpr uint32_t aimed_rays = 4;
+
 // Thread-safe: gather() only reads.
 class Gatherer {
    public:
     Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters,
              const DoorPaths& paths)
-        : rays_(rays), unwrap_(unwrap), texels_(texels), emitters_(emitters), paths_(paths), sky_(rays.scene()) {}
+        : rays_(rays),
+          unwrap_(unwrap),
+          texels_(texels),
+          emitters_(emitters),
+          paths_(paths),
+          sky_(rays.scene()),
+          guides_(rays) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
-    // Unbiased: emitters are found by area and by hit, an image sky by its own density and by miss, weighted by the
-    // balance heuristic (Veach 1995).
+    // `aims`: doors that get `aimed_rays` each besides. Unbiased: emitters are found by area and by hit, an image sky
+    // by its own density and by miss, what surfaces and a constant sky send through an aimed door by its rays and all
+    // others, weighted by the balance heuristic (Veach 1995).
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                TermAccumulator<Gathered>& sum, GatherLinks* links) const;
+                TermAccumulator<Gathered>& sum, GatherLinks* links, std::span<const DoorAim> aims = {}) const;
+    DoorAim aimAt(const GatherFrom& from, uint32_t door) const;
 
     GatherFrom at(size_t receiver) const {
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
@@ -91,11 +109,17 @@ class Gatherer {
     const Unwrap& unwrap() const { return unwrap_; }
     const Texels& texels() const { return texels_; }
     const DoorPaths& paths() const { return paths_; }
+    const EmitterSampler& emitters() const { return emitters_; }
 
    private:
     struct Ray;
     uint32_t throughLeaves(const Ray& ray, float distance_m) const;
     void take(const Ray& ray, const Hit& hit, uint32_t path) const;
+    void takeSky(const Ray& ray, uint32_t path) const;
+    void follow(const Ray& ray, uint32_t seed) const;
+    void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
+                     TermAccumulator<Gathered>& sum, std::span<const DoorAim> aims, size_t aim) const;
+    float shareOf(const Ray& ray, uint32_t term) const;
     uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
     glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const;
     void sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const;
@@ -107,6 +131,7 @@ class Gatherer {
     const EmitterSampler& emitters_;
     const DoorPaths& paths_;
     SkySampler sky_;
+    DoorGuides guides_;
 };
 
 }  // namespace dimmer::cook

@@ -35,6 +35,13 @@ inline glm::vec2 sequence2d(uint32_t i, uint32_t seed) {
     return {unitFloat(hash(seed) + i * step_x), unitFloat(hash(seed ^ 0x68bc21ebu) + i * step_y)};
 }
 
+// The same in three dimensions: steps 1/g, 1/g^2 and 1/g^3, g^4 = g + 1.
+inline glm::vec3 sequence3d(uint32_t i, uint32_t seed) {
+    constexpr uint32_t step_x = 3518319155u, step_y = 2882110345u, step_z = 2360945575u;
+    return {unitFloat(hash(seed) + i * step_x), unitFloat(hash(seed ^ 0x68bc21ebu) + i * step_y),
+            unitFloat(hash(seed ^ 0x02e5be93u) + i * step_z)};
+}
+
 // Radical inverse, for Halton points.
 inline float radicalInverse(uint32_t base, uint32_t i) {
     const float inverse_base = 1.0f / static_cast<float>(base);

@@ -14,6 +14,8 @@ namespace {
 // Bounced light of a set below this share of its activity threshold does not bounce on: with the usual threshold of
 // 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss.
 constexpr float lingering_share = 0.01f;
+// Terms with doors are many, and their thresholds a few thousandths of the light around the door.
+constexpr float door_lingering_share = 0.1f;
 // A term with doors need not be stored where it is this much fainter than what its light group's own threshold asks
 // for.
 constexpr float door_threshold_share = 0.3f;
@@ -58,6 +60,7 @@ class Expansion {
         bounce();
         decideActivity();
         out_.rays = rays_traced_;
+        out_.doors_seen = std::move(doors_seen_);
         return std::move(out_);
     }
 
@@ -208,7 +211,7 @@ class Expansion {
         const std::vector<TermReport> reports = thresholds();
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
-            least_[t] = lingering_share * reports[t].threshold_lux;
+            least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
     }
 
     std::vector<TermReport> thresholds() const {

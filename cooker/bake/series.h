@@ -15,6 +15,7 @@ struct Series {
     SparseLight left_to_renderer;         // the part of `direct` that renderers draw themselves and no pack stores
     Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
     SparseLight radiance;                 // what leaves each receiver, cd/m2
+    Sparse<uint32_t> doors_seen;          // by the rays of each receiver, ascending
     std::vector<TermReport> reports;      // per term
     uint32_t bounces = 0;
     uint64_t rays = 0;

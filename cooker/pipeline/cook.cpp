@@ -1,6 +1,7 @@
 #include <pipeline/cook.h>
 
 #include <bake/bake.h>
+#include <bake/door_pairs.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
@@ -85,6 +86,22 @@ void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats
                                                  scene.file, scene.doors[d].name));
 }
 
+// A loss above the activity threshold is worth a word.
+void suggestCombinations(const RayScene& rays, const Unwrap& charts, const Texels& texels, const BakeSettings& settings,
+                         Progress& progress, CookStats& stats) {
+    const Scene& scene = rays.scene();
+    for (const DoorPair& pair : dependentDoors(rays, charts, texels, settings, settings.threshold, progress)) {
+        const std::string first = "door:" + scene.doors[pair.first].name,
+                          second = "door:" + scene.doors[pair.second].name;
+        stats.suggested_combinations.emplace_back(first, second);
+        stats.warnings.push_back(
+            fmt::format("{}: '{}' and '{}' depend on each other: {:.0f} % of the light that the lesser of them moves "
+                        "needs both, and "
+                        "is left out; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations'",
+                        scene.file, first, second, 100 * static_cast<double>(pair.loss), first, second));
+    }
+}
+
 void describePlaces(const Scene& scene, PackData& pack) {
     for (const SceneViewpoint& v : scene.viewpoints)
         pack.viewpoints.push_back({v.name,
@@ -139,7 +156,9 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Baked baked;
     {
         Stopwatch watch(stats, "bake");
-        baked = bake(*rays, charts, texels, bakeSettings(profile, *quality), progress);
+        const BakeSettings settings = bakeSettings(profile, *quality);
+        if (quality->suggest_combinations) suggestCombinations(*rays, charts, texels, settings, progress, stats);
+        baked = bake(*rays, charts, texels, settings, progress);
     }
     stats.rays = baked.rays;
     stats.bounces = baked.bounces;
@@ -177,6 +196,7 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     for (Quality* quality : {&profile->draft, &profile->preview, &profile->final}) {
         quality->per_set_passes = options.per_set_passes;
         quality->light_grid = options.light_grid;
+        quality->suggest_combinations = options.suggest_combinations;
     }
     CookResult result;
     Expected<Scene> scene;

@@ -20,7 +20,9 @@ struct CookOptions {
     std::string quality = "preview";
     uint32_t threads = 0;         // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
-    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
+    bool suggest_combinations =
+        false;               // measure which pairs of doors the level should name; see suggested_combinations
+    bool light_grid = true;  // false: shadow rays to every light from everywhere, see BakeSettings
 };
 
 struct CookStats {
@@ -28,6 +30,8 @@ struct CookStats {
     uint64_t rays = 0;
     uint32_t bounces = 0;
     uint64_t peak_bytes = 0;  // of the whole process
+    // For `dimmer_combinations`: names of doors as the level writes them. Empty unless asked for.
+    std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;
 };
 

@@ -462,6 +462,9 @@ def build():
             "source": "made for Dimmer by game_sample/levels/make_house.py",
             "dimmer_sky_color": [0.55, 0.7, 1.0],
             "dimmer_sky_luminance": 14,
+            # What `dimmer cook --suggest-combinations` says: all three doors open into the hall, and each is lit by what
+            # the others, closed, reflect.
+            "dimmer_combinations": [["door:front", "door:den"], ["door:den", "door:living"], ["door:front", "door:living"]],
         },
     )
     add_places(gltf)

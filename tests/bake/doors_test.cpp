@@ -1,5 +1,6 @@
 // Doors in the bake: terms of light groups over open and closed doors, against scenes that leave the doors out.
 #include <bake/baked_scene.h>
+#include <bake/door_pairs.h>
 #include <bake/door_paths.h>
 #include <bake/door_rays.h>
 #include <bake/reference.h>
@@ -255,6 +256,40 @@ TEST(Doors, WhatAnOpeningUncoversIsLit) {
     const Compared open = compare(b, scene, 1, 1, 40, 2048, covered), closed = compare(b, scene, 0, 1, 40, 8, covered);
     EXPECT_NEAR(open.baked / open.reference, 1, 0.02 + 4 * open.noise / open.reference);
     EXPECT_EQ(closed.baked, 0);
+}
+
+// A corridor of three doors: neighbours share a room, the outer two do not. What is suggested goes away once named, and
+// is what a bake that keeps it adds.
+TEST(Doors, PairsThatDependOnEachOtherAreFound) {
+    Scene scene = corridor();
+    const auto found = [](const Scene& level) {
+        const BakedScene b(level);
+        SilentProgress silent;
+        return dependentDoors(*b.rays, b.charts, b.texels, {.series_rays = 32, .final_rays = 0}, 0.01f, silent);
+    };
+    const auto pairs = found(scene);
+    ASSERT_EQ(pairs.size(), 2u);
+    for (const DoorPair& pair : pairs) EXPECT_EQ(pair.second, pair.first + 1);
+    scene.combinations = {{{true, 0}, {true, 1}}};
+    ASSERT_EQ(found(scene).size(), 1u);
+    EXPECT_EQ(found(scene)[0].first, 1u);
+
+    // The predicted loss against the flux of the terms of a bake that keeps the combination.
+    BakedScene b(scene);
+    b.bake({.series_rays = 256, .final_rays = 32, .threshold = 0});
+    double alone[2] = {}, together = 0;
+    for (size_t t = 0; t < b.baked.terms.size(); ++t) {
+        const Term& term = b.baked.terms[t];
+        const auto about = [&](uint32_t d) {
+            return std::ranges::count(term.doors_open, d) + std::ranges::count(term.doors_closed, d) > 0;
+        };
+        const size_t doors = term.doors_open.size() + term.doors_closed.size();
+        for (uint32_t d : {0u, 1u}) alone[d] += doors == 1 && about(d) ? b.baked.reports[t].energy : 0;
+        together += doors == 2 && about(0) && about(1) ? b.baked.reports[t].energy : 0;
+    }
+    const DoorPair& first = pairs[0].first == 0 ? pairs[0] : pairs[1];
+    // Few rays against many: a tenth.
+    EXPECT_NEAR(static_cast<double>(first.loss) / (together / std::min(alone[0], alone[1])), 1, 0.1);
 }
 
 }  // namespace

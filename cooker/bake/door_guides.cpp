@@ -1,0 +1,194 @@
+#include <bake/door_guides.h>
+
+#include <bake/punctual.h>
+#include <bake/sampling.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr uint32_t door_points = 256;
+// Lamps that bring less than this share of the light at a point of the door light no patch worth a box.
+constexpr float share_min = 0.01f;
+constexpr float far_away_m = 1e30f;
+// Boxes of patches have some thickness, so that every point sees them from outside.
+constexpr float inflate_m = 0.05f;
+// The door's own box takes this share of the rays where there are patches too.
+constexpr float door_share = 0.5f;
+// Of the angle between a point's normal and a box, which may reach higher than its middle.
+constexpr float cosine_min = 0.1f;
+constexpr float infinity = std::numeric_limits<float>::infinity();
+
+struct Photon {
+    glm::vec3 place;
+    float flux;
+};
+
+GuideBox empty() {
+    return {glm::vec3(infinity), glm::vec3(-infinity), 0};
+}
+
+void include(GuideBox& box, glm::vec3 p) {
+    box.low = glm::min(box.low, p);
+    box.high = glm::max(box.high, p);
+}
+
+GuideBox boundsOf(std::span<const Photon> photons) {
+    GuideBox box = empty();
+    for (const Photon& p : photons) {
+        include(box, p.place);
+        box.flux += p.flux;
+    }
+    box.low -= inflate_m;
+    box.high += inflate_m;
+    return box;
+}
+
+// Shadow photons: where lamps' light that passes a point of the door's box lands, as if no door stood anywhere.
+std::vector<Photon> shadowPhotons(const RayScene& rays, const GuideBox& door, uint32_t seed) {
+    std::vector<Photon> photons;
+    std::vector<Illumination> lit;
+    for (uint32_t i = 0; i < door_points; ++i) {
+        const glm::vec2 u = sequence2d(i, seed);
+        const glm::vec3 within(u, radicalInverse(5, i + 1));
+        const glm::vec3 point = glm::mix(door.low, door.high, within);
+        float sum = 0;
+        lit.clear();
+        for (const PunctualLight& light : rays.scene().lights) {
+            if (light.bake != BakeMode::None) lit.push_back(illuminate(light, point));
+            if (light.bake != BakeMode::None) sum += luminance(lit.back().irradiance_lux);
+        }
+        for (const Illumination& l : lit) {
+            const float flux = luminance(l.irradiance_lux);
+            if (!(flux > share_min * sum)) continue;
+            const float distance_m = std::isinf(l.distance_m) ? far_away_m : l.distance_m;
+            if (!(rays.transmittance(point, l.towards_light, distance_m, Surfaces::Walls) > 0)) continue;
+            const auto hit = rays.nearest(point, -l.towards_light, far_away_m, hash(seed, i), Surfaces::Walls);
+            if (hit && !hit->back) photons.push_back({point - l.towards_light * hit->distance_m, flux});
+        }
+    }
+    return photons;
+}
+
+// Splits the cluster that gains most, across its longest side, until there are enough.
+std::vector<GuideBox> cluster(std::vector<Photon> photons) {
+    if (photons.empty()) return {};
+    struct Range {
+        size_t begin, end;
+        GuideBox box;
+        float gain() const {
+            const glm::vec3 d = box.high - box.low;
+            return end - begin < 2 ? 0 : box.flux * (d.x * d.y + d.y * d.z + d.z * d.x);
+        }
+    };
+    std::vector<Range> ranges{{0, photons.size(), boundsOf(photons)}};
+    while (ranges.size() < patch_boxes_max) {
+        auto& widest = *std::ranges::max_element(ranges, {}, &Range::gain);
+        if (!(widest.gain() > 0)) break;
+        const glm::vec3 d = widest.box.high - widest.box.low;
+        const int axis = d.x >= d.y && d.x >= d.z ? 0 : d.y >= d.z ? 1 : 2;
+        const float middle = 0.5f * (widest.box.low[axis] + widest.box.high[axis]);
+        const auto first = photons.begin() + static_cast<long>(widest.begin);
+        const auto last = photons.begin() + static_cast<long>(widest.end);
+        const auto split = std::stable_partition(first, last, [&](const Photon& p) { return p.place[axis] < middle; });
+        const auto at = static_cast<size_t>(split - photons.begin());
+        if (at == widest.begin || at == widest.end) break;
+        const Range upper{at, widest.end, boundsOf({photons.data() + at, widest.end - at})};
+        widest = {widest.begin, at, boundsOf({photons.data() + widest.begin, at - widest.begin})};
+        ranges.push_back(upper);
+    }
+    std::vector<GuideBox> boxes;
+    for (const Range& r : ranges) boxes.push_back(r.box);
+    return boxes;
+}
+
+}  // namespace
+
+DoorGuides::DoorGuides(const RayScene& rays) : boxes_(rays.scene().doors.size()) {
+    std::vector<GuideBox> doors(boxes_.size(), empty());
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+        const uint32_t condition = rays.triangles()[t].condition;
+        if (condition == no_condition || (condition & 1)) continue;  // where the leaf stands closed, the opening is
+        for (int i = 0; i < 3; ++i) include(doors[condition / 2], rays.corner(t, i));
+    }
+    tbb::parallel_for(size_t{0}, doors.size(), [&](size_t d) {
+        if (!(doors[d].low.x <= doors[d].high.x)) return;
+        boxes_[d] = {doors[d]};
+        const auto patches = cluster(shadowPhotons(rays, doors[d], static_cast<uint32_t>(d)));
+        boxes_[d].insert(boxes_[d].end(), patches.begin(), patches.end());
+    });
+}
+
+Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal) {
+    float patches = 0, door = 0;
+    for (size_t b = 0; b < boxes.size(); ++b) {
+        Target t{boxes[b].low - point, boxes[b].high - point, 0, glm::vec3(0), glm::vec3(0)};
+        const glm::vec3 size = t.high - t.low, centre = 0.5f * (t.low + t.high);
+        t.side_area_m2 = {size.y * size.z, size.z * size.x, size.x * size.y};
+        const float distance2 = glm::dot(centre, centre) + 0.25f * glm::dot(size, size);
+        float seen = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (!(t.low[axis] > 0 || t.high[axis] < 0)) continue;  // the point lies between the two sides
+            const float away = t.low[axis] > 0 ? t.low[axis] : -t.high[axis];
+            t.side_chance[axis] = t.side_area_m2[axis] * away / (distance2 * std::sqrt(distance2));
+            seen += t.side_chance[axis];
+        }
+        const glm::vec3 highest(normal.x > 0 ? t.high.x : t.low.x, normal.y > 0 ? t.high.y : t.low.y,
+                                normal.z > 0 ? t.high.z : t.low.z);
+        // A patch on the point's own surface sends nothing there.
+        if (!(seen > 0) || !(glm::dot(highest, normal) > (b == 0 ? 0 : 2 * inflate_m))) continue;
+        t.side_chance /= seen;
+        const float cosine = std::max(cosine_min, glm::dot(centre, normal) / std::sqrt(distance2));
+        const float area_m2 = std::max(t.side_area_m2.x, std::max(t.side_area_m2.y, t.side_area_m2.z));
+        t.chance = b == 0 ? 1 : boxes[b].flux / area_m2 * seen * cosine;
+        (b == 0 ? door : patches) += t.chance;
+        targets_[count_++] = t;
+    }
+    if (count_ == 0) return;
+    const float of_door = door > 0 ? (patches > 0 ? door_share : 1) : 0;
+    for (uint32_t i = 0; i < count_; ++i) {
+        const bool is_door = i == 0 && door > 0;
+        targets_[i].chance = is_door ? of_door : targets_[i].chance / patches * (1 - of_door);
+    }
+}
+
+glm::vec3 Guide::sample(float choice, glm::vec2 u) const {
+    uint32_t i = 0;
+    for (; i + 1 < count_ && choice >= targets_[i].chance; ++i) choice -= targets_[i].chance;
+    const Target& t = targets_[i];
+    choice = std::clamp(choice / t.chance, 0.0f, 1.0f);
+    int axis = 0;
+    for (; axis < 2 && choice >= t.side_chance[axis]; ++axis) choice -= t.side_chance[axis];
+    while (t.side_chance[axis] <= 0) axis = (axis + 2) % 3;  // rounding may have run past the last side
+    const int across = (axis + 1) % 3, along = (axis + 2) % 3;
+    glm::vec3 place;
+    place[axis] = t.low[axis] > 0 ? t.low[axis] : t.high[axis];
+    place[across] = glm::mix(t.low[across], t.high[across], u.x);
+    place[along] = glm::mix(t.low[along], t.high[along], u.y);
+    return glm::normalize(place);
+}
+
+float Guide::pdf(glm::vec3 direction) const {
+    float sum = 0;
+    const glm::vec3 inverse = 1.0f / direction;
+    for (uint32_t i = 0; i < count_; ++i) {
+        const Target& t = targets_[i];
+        const glm::vec3 a = t.low * inverse, b = t.high * inverse;
+        const glm::vec3 near = glm::min(a, b), far = glm::max(a, b);
+        const int axis = near.x >= near.y && near.x >= near.z ? 0 : near.y >= near.z ? 1 : 2;
+        const float distance = near[axis];
+        if (!(distance > 0) || !(distance <= std::min(far.x, std::min(far.y, far.z)))) continue;
+        // From uniform on a side to directions: squared distance over area and cosine.
+        if (t.side_chance[axis] > 0)
+            sum += t.chance * t.side_chance[axis] * distance * distance /
+                   (t.side_area_m2[axis] * std::abs(direction[axis]));
+    }
+    return sum;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,57 @@
+// Where rays should look for the light that a door lets through: at the door itself, and at the patches that lamps
+// light through it (UBERBAKE, section 4.2: shadow photons from the door to lights and back, clustered into boxes).
+#pragma once
+
+#include <trace/ray_scene.h>
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+// An axis-aligned box, and how much of the light through the door lands in it: arbitrary units.
+struct GuideBox {
+    glm::vec3 low{0}, high{0};
+    float flux = 0;
+};
+
+inline constexpr uint32_t patch_boxes_max = 12;
+
+// Immutable after construction.
+class DoorGuides {
+   public:
+    explicit DoorGuides(const RayScene& rays);
+    // The door's own box first, then at most patch_boxes_max of patches.
+    std::span<const GuideBox> boxes(uint32_t door) const { return boxes_[door]; }
+
+   private:
+    std::vector<std::vector<GuideBox>> boxes_;
+};
+
+// Directions from one point towards a door's boxes: a mixture over boxes, over the sides of a box that face the point,
+// uniform over a side. From outside a box, every direction into it passes exactly one such side.
+class Guide {
+   public:
+    Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal);
+    // Nothing in sight: no box lies above the horizon, or the point is inside of all that do.
+    bool empty() const { return count_ == 0; }
+    // Unit direction; `choice` picks box and side, `u` the place on it; all in [0, 1).
+    glm::vec3 sample(float choice, glm::vec2 u) const;
+    // Per steradian.
+    float pdf(glm::vec3 direction) const;
+
+   private:
+    struct Target {
+        glm::vec3 low, high;    // from the point
+        float chance;           // of the box
+        glm::vec3 side_chance;  // by the side's axis, within the box
+        glm::vec3 side_area_m2;
+    };
+    uint32_t count_ = 0;
+    std::array<Target, patch_boxes_max + 1> targets_;
+};
+
+}  // namespace dimmer::cook
