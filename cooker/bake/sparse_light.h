@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <span>
@@ -88,11 +89,11 @@ class Sparse {
 
 using SparseLight = Sparse<TermLight>;
 
-// One worker's dense scratch over terms, emptied in time proportional to what was touched.
+// One worker's dense scratch over terms, emptied in time proportional to what was touched (and a 64th of the rest).
 template <class Value>
 class TermAccumulator {
    public:
-    explicit TermAccumulator(uint32_t terms) : values_(terms), used_(terms), unwanted_(terms) {}
+    explicit TermAccumulator(uint32_t terms) : values_(terms), marks_((terms + 63) / 64), unwanted_(terms) {}
 
     // What nobody wants need not be added up; all are wanted to begin with.
     bool wants(uint32_t term) const { return !unwanted_[term]; }
@@ -100,28 +101,26 @@ class TermAccumulator {
     void wantNone() { std::ranges::fill(unwanted_, uint8_t{1}); }
 
     Value& operator[](uint32_t term) {
-        if (!used_[term]) {
-            used_[term] = 1;
-            touched_.push_back(term);
-        }
+        marks_[term / 64] |= uint64_t{1} << (term % 64);
         return values_[term];
     }
     // Terms touched since the last clear, ascending.
     std::span<const uint32_t> touched() {
-        std::ranges::sort(touched_);
+        touched_.clear();
+        for (uint32_t word = 0; word < marks_.size(); ++word)
+            for (uint64_t bits = marks_[word]; bits != 0; bits &= bits - 1)
+                touched_.push_back(64 * word + static_cast<uint32_t>(std::countr_zero(bits)));
         return touched_;
     }
     void clear() {
-        for (uint32_t t : touched_) {
-            values_[t] = Value{};
-            used_[t] = 0;
-        }
-        touched_.clear();
+        for (uint32_t t : touched()) values_[t] = Value{};
+        std::ranges::fill(marks_, uint64_t{0});
     }
 
    private:
     std::vector<Value> values_;
-    std::vector<uint8_t> used_, unwanted_;
+    std::vector<uint64_t> marks_;
+    std::vector<uint8_t> unwanted_;
     std::vector<uint32_t> touched_;
 };
 
