@@ -208,14 +208,14 @@ def cook_seconds(level, quality, folder, *options):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, text, overlap
 
 
-def sets_table(folder, runs=5):
+def sets_table(folder, runs=3):
     """What light sets cost: the same lights all always on, in 12 and 24 sets, and with a gather for each set."""
     variants = [("all lights in the base", house_variant(folder, "base", lambda s, i: None), []),
                 ("12 sets", HOUSE, []),
                 ("24 sets", house_variant(folder, "sets24", lambda s, i: f"{s}{i % 2}"), []),
                 ("24 sets, --per-set-passes", folder / "sets24.gltf", ["--per-set-passes"])]
     rows = []
-    for quality in ("draft", "final"):
+    for quality in ("draft", "preview"):
         taken = {name: [] for name, _, _ in variants}
         for _ in range(runs):  # in turns: what else the machine does falls on all alike
             for name, level, options in variants:
