@@ -160,7 +160,8 @@ const Fault address_faults[] = {
      "in more than 4 tiles of one page"},
     {"an odd batch within its cluster",
      [](PackData& d) {
-         const size_t b = d.clusters[clusterWith(d, 65, 1, 2)].first_batch;
+         size_t b = 0;  // a full one, followed by one with room, of the same cluster
+         while (d.batches[b].receiver_count < 64 || d.batches[b + 1].receiver_count == 64) ++b;
          --d.batches[b].receiver_count;
          --d.batches[b + 1].first_receiver;
          ++d.batches[b + 1].receiver_count;
