@@ -17,6 +17,7 @@ struct Arguments {
     CookOptions options;
     std::string json;
     std::string write_level;
+    bool suggest_combinations = false;
 };
 
 std::string share(uint64_t bytes, uint64_t budget) {
@@ -90,7 +91,7 @@ int run(const Arguments& a) {
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
-    if (a.json != "-" && a.options.suggest_combinations)
+    if (a.json != "-" && a.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
 }
@@ -113,8 +114,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
     c->add_flag(
-        "--suggest-combinations", a->options.suggest_combinations,
-        "measure which pairs of doors lose light that needs both, warn, and print them for dimmer_combinations");
+        "--suggest-combinations", a->suggest_combinations,
+        "print the pairs of doors that lose light which needs both (each a warning, too) for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
     c->add_flag_callback(

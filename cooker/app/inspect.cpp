@@ -49,7 +49,9 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                   {"ancillary", cost.ancillary}, {"meshes", cost.meshes}};
     uint64_t texels = 0;
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n) texels += cost.overlap_histogram[n];
-    j["receivers"] = {{"texels", texels}, {"local_probes", 0}, {"global_probes", 0}};
+    const size_t global_probes = d.probes.global.positions.size();
+    j["receivers"] = {
+        {"texels", texels}, {"local_probes", d.probes.base.size() - global_probes}, {"global_probes", global_probes}};
     j["pages"] = nlohmann::ordered_json::array();
     for (uint32_t p = 0; p < d.page_count; ++p)
         j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
