@@ -2,6 +2,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
+#include <pipeline/write_level.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
@@ -15,6 +16,7 @@ namespace {
 struct Arguments {
     CookOptions options;
     std::string json;
+    std::string write_level;
     bool suggest_combinations = false;
 };
 
@@ -77,9 +79,14 @@ int run(const Arguments& a) {
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
+    if (!a.write_level.empty())
+        if (auto ok = checkWritable(a.write_level); !ok) return reportError(ok.error());
     TerminalProgress progress;
-    const auto result = cook(a.options, progress);
+    auto result = cook(a.options, progress);
     if (!result) return reportError(result.error());
+    if (!a.write_level.empty())
+        if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)
+            return reportError(ok.error());
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
@@ -114,6 +121,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
+    c->add_option("--write-level", a->write_level,
+                  "write the level there as .glb, its meshes with the final lightmap UVs in TEXCOORD_1");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

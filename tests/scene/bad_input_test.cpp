@@ -250,6 +250,17 @@ TEST(SceneBadInput, EveryTruncationIsRefused) {
                        {});
 }
 
+// Found by fuzzing: where the header counts nothing, no chunk was checked, and the JSON's length was believed.
+TEST(SceneBadInput, AGlbThatCountsLessThanItsFirstChunk) {
+    for (const uint8_t length : {0, 12, 19}) {
+        std::vector<uint8_t> bytes = fullLevel().glb();
+        bytes[8] = length;
+        bytes[9] = bytes[10] = bytes[11] = 0;
+        bytes[14] = 0xff;  // the JSON chunk claims 16 MB
+        expectBadInput(importBytes("level.glb", bytes), {"truncated", std::to_string(length) + " bytes"});
+    }
+}
+
 TEST(SceneBadInput, FlippedBitsGetAnAnswer) {
     const std::vector<uint8_t> whole = fullLevel().glb();
     std::mt19937 random(1);
