@@ -253,7 +253,7 @@ TEST(Snippets, DocumentsQuoteThem) {
     const std::filesystem::path root = DIMMER_SOURCE_DIR;
     auto snippets = snippetsOf(readText(root / "tests/app/snippets_test.cpp"));
     snippets.merge(snippetsOf(readText(root / "tests/c/c_api.c")));
-    ASSERT_EQ(snippets.size(), 10u);
+    ASSERT_EQ(snippets.size(), 11u);
     for (const char* document : {"README.md", "docs/integrate.md"}) {
         const auto quotes = quotesOf(readText(root / document));
         EXPECT_FALSE(quotes.empty()) << document;
