@@ -1,6 +1,7 @@
 #include <update/device_places.h>
 
 #include <pack/batches.h>
+#include <probes/grid_table.h>
 
 #include <algorithm>
 #include <initializer_list>
@@ -43,10 +44,10 @@ uint64_t tableBytes(std::initializer_list<uint64_t> tables) {
 void addProbes(const ProbeData& probes, DeviceBytes& bytes) {
     const uint64_t records = probes.payload.size() + probes.numbers.size();
     bytes.dynamic += records * sizeof(ProbeRecord);
-    bytes.ancillary += probes.base.size() * sizeof(ProbeRecord) - records * sizeof(ProbeRecord) +
-                       tableBytes({16 * records, 8 * records, 4 * records, probes.numbers.size() * sizeof(uint32_t),
+    bytes.ancillary += tableBytes({16 * records, 8 * records, 4 * records, probes.numbers.size() * sizeof(uint32_t),
                                    probes.batches.size() * sizeof(BatchPlace), probes.batches.size() * sizeof(WorkItem),
-                                   probes.terms.size() * sizeof(WorkTerm)});
+                                   probes.terms.size() * sizeof(WorkTerm)}) -
+                       records * sizeof(ProbeRecord);
 }
 
 }  // namespace
@@ -54,6 +55,7 @@ void addProbes(const ProbeData& probes, DeviceBytes& bytes) {
 DeviceBytes deviceBytesOf(const PackData& data) {
     DeviceBytes bytes;
     bytes.base_lightmap = data.base_pages.size() * sizeof(TexelRecord);
+    bytes.ancillary += data.probes.base.size() * sizeof(ProbeRecord) + gridTableBytes(data.probes.global);
     if (!data.probes.payload.empty()) addProbes(data.probes, bytes);
     if (data.payload.empty()) return bytes;  // no texel ever changes
     const uint64_t dynamic = (data.payload.size() + data.addresses.size()) * sizeof(TexelRecord);

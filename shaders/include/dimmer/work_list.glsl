@@ -47,10 +47,22 @@ struct BatchPlace {
     DIMMER_UINT unused;
 };
 
+// Up to 64 probes of a moving model to be taken from the global grid: a lattice of counts x..z in the world.
+struct ResampleItem {
+    float origin_x, origin_y, origin_z;
+    DIMMER_UINT first_probe;  // the lattice's
+    float step_x_x, step_x_y, step_x_z;
+    DIMMER_UINT counts;  // x | y << 8 | z << 16
+    float step_y_x, step_y_y, step_y_z;
+    DIMMER_UINT first;  // of the lattice's probes, those of this item
+    float step_z_x, step_z_y, step_z_z;
+    DIMMER_UINT count;
+};
+
 #undef DIMMER_UINT
 #ifdef __cplusplus
 static_assert(sizeof(WorkItem) == 16 && sizeof(WorkTerm) == 16 && sizeof(BatchPlace) == 16);
-static_assert(sizeof(TexelItem) == 8 && sizeof(TexelBatch) == 16);
+static_assert(sizeof(TexelItem) == 8 && sizeof(TexelBatch) == 16 && sizeof(ResampleItem) == 64);
 }  // namespace dimmer
 #endif
 
