@@ -1,7 +1,7 @@
 // The command line: one function per subcommand, each in its own file, and what they share.
 #pragma once
 
-#include <dimmer/error.h>
+#include <dimmer/pack.h>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -30,6 +30,7 @@ void addVerifyCommand(CLI::App& app, int& exit_code);
 void addReferenceCommand(CLI::App& app, int& exit_code);
 void addExplainCommand(CLI::App& app, int& exit_code);
 void addExportCommand(CLI::App& app, int& exit_code);
+void addReportCommand(CLI::App& app, int& exit_code);
 
 // Prints the message to stderr; the exit code that belongs to it.
 int reportError(const Error& error);
@@ -37,6 +38,10 @@ int exitCodeOf(ErrorCode code);
 
 // To a file, or to stdout for "-".
 Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& file);
+
+// The HTML of report/report.h, to a file.
+struct ReportInput;
+Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std::string& file);
 
 std::string humanBytes(uint64_t bytes);
 

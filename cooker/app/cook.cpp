@@ -1,8 +1,10 @@
 #include <app/command.h>
+#include <app/json_progress.h>
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
 #include <pipeline/write_level.h>
+#include <report/report.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
@@ -17,6 +19,8 @@ struct Arguments {
     CookOptions options;
     std::string json;
     std::string write_level;
+    std::string report;
+    std::string progress = "text";
     bool suggest_combinations = false;
 };
 
@@ -73,20 +77,38 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     return json;
 }
 
+Expected<void> writeReport(const CookResult& result, const Arguments& a) {
+    const auto pack = Pack::fromData(PackData(result.pack));
+    if (!pack) return std::unexpected(pack.error());
+    ReportInput input;
+    input.title = a.options.pack.filename().string();
+    input.file_bytes = result.file_bytes;
+    input.seconds = result.stats.seconds;
+    input.warnings = result.stats.warnings;
+    return writeReport(*pack, input, a.report);
+}
+
 int run(const Arguments& a) {
     const auto profile = loadProfile(a.options.profile);
     if (!profile) return reportError(profile.error());
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
-    if (!a.write_level.empty())
-        if (auto ok = checkWritable(a.write_level); !ok) return reportError(ok.error());
-    TerminalProgress progress;
-    auto result = cook(a.options, progress);
+    for (const std::string& file : {a.write_level, a.report})
+        if (!file.empty())
+            if (auto ok = checkWritable(file); !ok) return reportError(ok.error());
+    std::unique_ptr<Progress> progress;
+    if (a.progress == "json")
+        progress = std::make_unique<JsonProgress>();
+    else
+        progress = std::make_unique<TerminalProgress>();
+    auto result = cook(a.options, *progress);
     if (!result) return reportError(result.error());
     if (!a.write_level.empty())
         if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)
             return reportError(ok.error());
+    if (!a.report.empty())
+        if (auto ok = writeReport(*result, a); !ok) return reportError(ok.error());
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
@@ -121,6 +143,13 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
+    c->add_option("--progress", a->progress,
+                  "text, or json: lines with stage, done, total and seconds_left (of the stage) on stderr, among "
+                  "messages that begin with \"dimmer: \"")
+        ->check(CLI::IsMember({"text", "json"}))
+        ->capture_default_str();
+    c->add_option("--report", a->report,
+                  "write an HTML page there: pages, regions of sets and doors, overlaps, budgets, times, warnings");
     c->add_option("--write-level", a->write_level,
                   "write the level there as .glb, its meshes with the final lightmap UVs in TEXCOORD_1");
     c->add_option(

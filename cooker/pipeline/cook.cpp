@@ -1,6 +1,7 @@
 #include <pipeline/cook.h>
 
 #include <bake/bake.h>
+#include <bake/buried_lights.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
@@ -137,6 +138,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         addOpenLeaves(scene);
         cutAtWalls(scene, profile.texels_per_metre);
         rays.emplace(scene);
+        const auto buried = warningsOfBuriedLights(*rays);
+        stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
         progress.advance(1);
         auto unwrapped = unwrap(*rays, {profile.texels_per_metre, profile.page_size});
         if (!unwrapped) return std::unexpected(unwrapped.error());

@@ -2,17 +2,10 @@
 
 #include <dimmer/cpu_runtime.h>
 #include <format/texel.h>
+#include <write/pack_writer.h>
+#include <write/png_writer.h>
 
 #include <fmt/format.h>
-
-// stb's own code is outside our warnings.
-#pragma GCC diagnostic push
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-#pragma GCC diagnostic ignored "-Wunused-function"
-#define STB_IMAGE_WRITE_STATIC
-#define STB_IMAGE_WRITE_IMPLEMENTATION
-#include <stb_image_write.h>
-#pragma GCC diagnostic pop
 
 #include <algorithm>
 #include <cmath>
@@ -72,8 +65,9 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
                          heat((p.value_lux - p.reference_lux) / (p.reference_lux + report.floor_lux)));
         }
         const auto file = folder / fmt::format("page_{}.png", page);
-        if (!stbi_write_png(file.c_str(), picture.width, picture.height, 3, picture.rgb.data(), picture.width * 3))
-            return fail(ErrorCode::Io, fmt::format("{}: the picture could not be written", file.string()));
+        const auto png = pngBytes(pack.pageWidth(), pack.pageHeight(), 3, picture.rgb);
+        if (!png) return std::unexpected(png.error());
+        if (auto ok = writeFileAtomically(file, *png); !ok) return ok;
     }
     return {};
 }

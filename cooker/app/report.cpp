@@ -1,0 +1,80 @@
+#include <app/command.h>
+#include <report/report.h>
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+namespace dimmer::cook {
+namespace {
+
+struct Arguments {
+    std::string pack, output, cook_json, verify_json, heat_maps;
+};
+
+Expected<nlohmann::json> readJson(const std::string& file) {
+    std::ifstream in(file);
+    if (!in) return fail(ErrorCode::Io, fmt::format("{}: it cannot be opened", file));
+    auto json = nlohmann::json::parse(in, nullptr, false);
+    if (json.is_discarded()) return fail(ErrorCode::BadInput, fmt::format("{}: it is no JSON", file));
+    return json;
+}
+
+// What `cook --json` wrote.
+Expected<void> addCook(const std::string& file, ReportInput& input) {
+    const auto json = readJson(file);
+    if (!json) return std::unexpected(json.error());
+    try {
+        input.seconds = json->at("seconds").get<std::map<std::string, double>>();
+        input.warnings = json->at("warnings").get<std::vector<std::string>>();
+    } catch (const nlohmann::json::exception&) {
+        return fail(ErrorCode::BadInput, fmt::format("{}: it is not what `dimmer cook --json` writes", file));
+    }
+    return {};
+}
+
+int run(const Arguments& a) {
+    const auto pack = Pack::open(a.pack);
+    if (!pack) return reportError(pack.error());
+    ReportInput input;
+    input.title = std::filesystem::path(a.pack).filename().string();
+    std::error_code ignored;
+    input.file_bytes = std::filesystem::file_size(a.pack, ignored);
+    if (!a.cook_json.empty())
+        if (auto ok = addCook(a.cook_json, input); !ok) return reportError(ok.error());
+    if (!a.verify_json.empty()) {
+        auto json = readJson(a.verify_json);
+        if (!json) return reportError(json.error());
+        input.verify = std::move(*json);
+    }
+    input.heat_maps = a.heat_maps;
+    if (auto ok = writeReport(*pack, input, a.output); !ok) return reportError(ok.error());
+    return exit_done;
+}
+
+}  // namespace
+
+Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std::string& file) {
+    const auto html = reportHtml(pack, input);
+    if (!html) return std::unexpected(html.error());
+    return writeFileAtomically(file, std::as_bytes(std::span(*html)));
+}
+
+void addReportCommand(CLI::App& app, int& exit_code) {
+    auto a = std::make_shared<Arguments>();
+    auto* c = app.add_subcommand("report", "A pack as one HTML page: what costs what, and where");
+    c->add_option("PACK", a->pack, "a cooked pack")->required();
+    c->add_option("-o,--output", a->output, "the file to write, e.g. house.html")->required();
+    c->add_option("--cook", a->cook_json, "what `dimmer cook --json` wrote: adds seconds per stage, and warnings");
+    c->add_option("--verify", a->verify_json, "what `dimmer verify --json` wrote: adds errors");
+    c->add_option("--heatmap", a->heat_maps, "the folder that `dimmer verify --heatmap` wrote: adds its pictures");
+    c->footer(
+        "Sizes are in bytes (kB, MB: 1000 and 1000000 of them). The page needs no network.\n"
+        "Example: dimmer report house.dimmer --verify error.json --heatmap error -o house.html");
+    c->callback([a, &exit_code] { exit_code = run(*a); });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,78 @@
+// `dimmer report` and `cook --report`.
+#include <app/tool_fixture.h>
+
+namespace dimmer::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+using ReportTool = ToolTest;
+
+TEST_F(ReportTool, OfAPackWithWhatCookAndVerifySaid) {
+    ASSERT_EQ(runDimmer({"verify", file("level.gltf"), pack(), "--points", "50", "--paths", "64", "--no-sets", "--json",
+                         file("error.json"), "--heatmap", file("heat")})
+                  .exit_code,
+              0);
+    const auto result = runDimmer({"report", pack(), "-o", file("report.html"), "--cook", file("cook.json"), "--verify",
+                                   file("error.json"), "--heatmap", file("heat")});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(readText(file("report.html")),
+                AllOf(HasSubstr("level.dimmer"), HasSubstr("region of both"), HasSubstr("encode"),
+                      HasSubstr("Error against"), HasSubstr("error on page 0")));
+}
+
+TEST_F(ReportTool, OfACook) {
+    const auto result = cook("reported.dimmer", {"--report", file("cooked.html")});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(readText(file("cooked.html")), AllOf(HasSubstr("reported.dimmer"), HasSubstr("region of one"),
+                                                     HasSubstr(" s in all"), HasSubstr("of 268.44 MB")));
+}
+
+// Every line of stderr is an object, but for messages; a stage begins at 0, never goes back, and ends at its total.
+TEST_F(ReportTool, ProgressForPipelines) {
+    const auto result = cook("progress.dimmer", {"--progress", "json"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    std::istringstream lines(result.err);
+    std::vector<std::string> stages;
+    json last;
+    for (std::string text; std::getline(lines, text);) {
+        if (text.starts_with("dimmer: ")) continue;
+        const json line = json::parse(text, nullptr, false);
+        ASSERT_TRUE(line.is_object()) << text;
+        for (const char* key : {"stage", "done", "total", "seconds_left"}) ASSERT_TRUE(line.contains(key)) << text;
+        EXPECT_LE(line["done"], line["total"]);
+        if (stages.empty() || stages.back() != line["stage"]) {
+            EXPECT_EQ(line["done"], 0);
+            EXPECT_TRUE(stages.empty() || last["done"] == last["total"]) << last;
+            stages.push_back(line["stage"]);
+        } else {
+            EXPECT_GE(line["done"], last["done"]);
+        }
+        last = line;
+    }
+    EXPECT_EQ(last["done"], last["total"]);
+    EXPECT_EQ(last["seconds_left"], 0);
+    EXPECT_THAT(stages, testing::IsSupersetOf({"charts", "encode"}));
+    EXPECT_EQ(cook("no.dimmer", {"--progress", "xml"}).exit_code, 2);
+}
+
+TEST_F(ReportTool, WhatIsRefused) {
+    const auto refused = [](const std::vector<std::string>& more, const std::string& message) {
+        std::vector<std::string> arguments = {"report", pack(), "-o", file("no.html")};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        const auto result = runDimmer(arguments);
+        EXPECT_EQ(result.exit_code, 2) << result.err;
+        EXPECT_THAT(result.err, HasSubstr(message));
+        EXPECT_FALSE(std::filesystem::exists(file("no.html")));
+    };
+    write("broken.json", "{");
+    refused({"--cook", file("none.json")}, "none.json");
+    refused({"--cook", file("broken.json")}, "no JSON");
+    refused({"--cook", write("list.json", "[1]")}, "not what `dimmer cook --json` writes");
+    refused({"--verify", file("broken.json")}, "no JSON");
+    refused({"--heatmap", file("nowhere")}, "page_0.png");
+}
+
+}  // namespace
+}  // namespace dimmer::test
