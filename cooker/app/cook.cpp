@@ -15,7 +15,31 @@ namespace {
 struct Arguments {
     CookOptions options;
     std::string json;
+    bool no_cache = false, explain_cache = false;
+    uint32_t cache_limit_mb = 4096;
 };
+
+// Beside the pack; nowhere where that is a device or a pipe.
+std::filesystem::path defaultCache(const std::filesystem::path& pack) {
+    std::error_code ignored;
+    const auto status = std::filesystem::status(pack, ignored);
+    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) return {};
+    return pack.parent_path() / ".dimmer-cache";
+}
+
+void printCache(const CookStats& stats) {
+    fmt::print("\n{:<26} {}\n", "stage", "from the cache?");
+    for (const CacheLine& line : stats.cache)
+        fmt::print("{:<26} {}\n", line.what, line.reused ? "reused" : "made: " + line.why);
+    if (stats.cache.empty()) fmt::print("no cache was used\n");
+}
+
+nlohmann::ordered_json cacheJson(const CookStats& stats) {
+    auto list = nlohmann::ordered_json::array();
+    for (const CacheLine& line : stats.cache)
+        list.push_back({{"stage", line.what}, {"reused", line.reused}, {"why", line.why}});
+    return list;
+}
 
 std::string share(uint64_t bytes, uint64_t budget) {
     return budget == 0
@@ -66,6 +90,7 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     json["peak_bytes"] = result.stats.peak_bytes;
     json["file_bytes"] = result.file_bytes;
     json["warnings"] = result.stats.warnings;
+    json["cache"] = cacheJson(result.stats);
     if (!result.stats.suggested_combinations.empty()) json["dimmer_combinations"] = suggestions(result.stats);
     return json;
 }
@@ -77,12 +102,19 @@ int run(const Arguments& a) {
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
     TerminalProgress progress;
-    const auto result = cook(a.options, progress);
+    CookOptions options = a.options;
+    options.cache_bytes_max = uint64_t{a.cache_limit_mb} << 20;
+    if (a.no_cache)
+        options.cache.clear();
+    else if (options.cache.empty())
+        options.cache = defaultCache(options.pack);
+    const auto result = cook(options, progress);
     if (!result) return reportError(result.error());
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
+    if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.options.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
@@ -113,6 +145,13 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
+    auto* cache = c->add_option("--cache", a->options.cache,
+                                "folder of what earlier cooks found out; default: .dimmer-cache beside the pack");
+    c->add_flag("--no-cache", a->no_cache, "keep nothing and reuse nothing; the pack is the same")->excludes(cache);
+    c->add_option("--cache-limit", a->cache_limit_mb,
+                  "MiB that the cache may hold; what was used least recently goes first")
+        ->capture_default_str();
+    c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

@@ -5,6 +5,7 @@
 #include <bake/progress.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,7 +36,8 @@ struct ReceiverLight {
 };
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
-// the receivers that see one of the doors, by what is stored.
+// the receivers that see one of the doors, by what is stored; the threshold of those is at least their group's own, and
+// that share of the group's light around the door.
 struct TermReport {
     uint64_t receivers = 0;  // active ones
     uint64_t measured_over = 0;
@@ -49,15 +51,33 @@ struct Baked {
     Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
     std::vector<Term> terms;          // as DoorPaths lists them
     std::vector<TermReport> reports;  // per term
-    uint32_t bounces = 0;
-    uint64_t rays = 0;
+    uint32_t bounces = 0;             // of the light group that took most
+    uint64_t rays = 0;                // traced, not remembered
     std::vector<std::string> warnings;
+};
+
+// All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
+// alone, so that a store can keep it.
+struct GroupLight {
+    Sparse<ReceiverLight> light;      // per receiver; `term` counts the group's own terms, variances are 0
+    std::vector<TermReport> reports;  // per term of the group
+    uint32_t bounces = 0;
+};
+
+// Where finished groups are kept from one bake to the next.
+class GroupStore {
+   public:
+    virtual ~GroupStore() = default;
+    // Groups that are found are not baked again.
+    virtual std::optional<GroupLight> find(uint32_t group) = 0;
+    virtual void keep(uint32_t group, const GroupLight& light) = 0;
 };
 
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
 // receivers traced once and followed bounce after bounce, then one gather of many rays that is kept.
-// Deterministic for any number of threads. Memory: 4 bytes * series_rays per texel, plus what is active.
+// Deterministic for any number of threads, and whatever a store already has. Memory: 4 bytes * series_rays per texel,
+// plus what is active.
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
-           Progress& progress);
+           Progress& progress, GroupStore* store = nullptr);
 
 }  // namespace dimmer::cook

@@ -3,6 +3,7 @@
 
 #include <bake/bake.h>
 #include <pack/pack_data.h>
+#include <pipeline/cook_cache.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
 
@@ -21,8 +22,10 @@ struct CookOptions {
     uint32_t threads = 0;         // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
     bool suggest_combinations =
-        false;               // measure which pairs of doors the level should name; see suggested_combinations
-    bool light_grid = true;  // false: shadow rays to every light from everywhere, see BakeSettings
+        false;                         // measure which pairs of doors the level should name; see suggested_combinations
+    bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
+    std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
+    uint64_t cache_bytes_max = uint64_t{4} << 30;
 };
 
 struct CookStats {
@@ -33,11 +36,13 @@ struct CookStats {
     // For `dimmer_combinations`: names of doors as the level writes them. Empty unless asked for.
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;
+    std::vector<CacheLine> cache;  // per stage that a cache could keep; empty without one
 };
 
-// Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data.
+// Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data, whatever the
+// cache has.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
-                             CookStats& stats);
+                             CookStats& stats, CookCache* cache = nullptr);
 
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality);
 
