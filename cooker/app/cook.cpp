@@ -96,8 +96,6 @@ nlohmann::ordered_json toJson(const CookResult& result) {
 }
 
 int run(const Arguments& a) {
-    const auto profile = loadProfile(a.options.profile);
-    if (!profile) return reportError(profile.error());
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
@@ -113,7 +111,7 @@ int run(const Arguments& a) {
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
-    if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
+    if (a.json != "-") printTable(*result, costOf(result->pack), result->profile);
     if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.options.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
@@ -135,6 +133,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
         ->check(CLI::IsMember({"draft", "preview", "final"}))
         ->capture_default_str();
+    c->add_option("--set", a->options.set,
+                  "key=value: a setting of the profile (see profiles/schema.json), before what level and profile say")
+        ->expected(1)
+        ->take_all();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
     c->add_flag(

@@ -18,14 +18,17 @@ struct BakeSettings {
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
     bool denoise = false;          // filter what noise is left, in lightmap space
     uint32_t bounces_max = 64;
-    float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
-    float threshold = 0.01f;  // activity, as a share of a term's mean; see TermReport
+    float tail_max = 0.002f;                   // stop when what is still to come is below this share of the sum
+    float threshold = 0.01f;                   // activity, as a share of a term's mean; see TermReport
+    std::vector<float> group_thresholds = {};  // the same for each light group; empty: one for all
     uint32_t seed = 1;
     // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
     bool light_grid = true;
     // The final gather once per term, as bakers do that know nothing of sharing rays: the same result, for
     // measuring against.
     bool per_set_passes = false;
+
+    float thresholdOf(uint32_t group) const { return group_thresholds.empty() ? threshold : group_thresholds[group]; }
 };
 
 // What is stored for one (receiver, term).

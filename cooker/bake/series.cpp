@@ -234,13 +234,14 @@ class Expansion {
     void decideLeast(uint32_t round) {
         const bool first = least_.empty();
         if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(round + 1))) return;
-        const std::vector<TermReport> reports = thresholds(std::min(settings_.threshold, lingering_threshold_max));
+        const std::vector<TermReport> reports = thresholds(lingering_threshold_max);
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
             least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
     }
 
-    std::vector<TermReport> thresholds(float threshold) const {
+    // `most`: no threshold is taken to be larger.
+    std::vector<TermReport> thresholds(float most) const {
         std::vector<TermReport> reports(terms_);
         std::vector<double> sums(terms_);
         Surroundings around(paths_, doors_seen_);
@@ -256,6 +257,7 @@ class Expansion {
             if (report.measured_over == 0) continue;
             report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
             if (t == always_group) continue;
+            const float threshold = std::min(settings_.thresholdOf(paths_.terms()[t].group), most);
             report.threshold_lux = threshold * report.mean_lux;
             if (t < paths_.groupCount()) continue;
             const float near = std::max(reports[paths_.terms()[t].group].mean_lux, around.mean(paths_.terms()[t]));
@@ -273,7 +275,7 @@ class Expansion {
     }
 
     void decideActivity() {
-        out_.reports = thresholds(settings_.threshold);
+        out_.reports = thresholds(1);
         std::vector<double> dropped(terms_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
             const double energy = static_cast<double>(texels_.area_m2[i] * stored);

@@ -122,7 +122,6 @@ Key bakeSettingsKey(const BakeSettings& s) {
         .add(uint32_t{s.denoise})
         .add(s.bounces_max)
         .add(s.tail_max)
-        .add(s.threshold)
         .add(s.seed)
         .add(uint32_t{s.light_grid})
         .finish();
@@ -151,8 +150,8 @@ Key lampsKey(const Scene& scene, uint32_t group) {
     return key.finish();
 }
 
-Key groupKey(const Key& charts, const Key& settings, const Key& lamps) {
-    return KeyBuilder("light").add(charts).add(settings).add(lamps).finish();
+Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps) {
+    return KeyBuilder("light").add(charts).add(settings).add(threshold).add(lamps).finish();
 }
 
 }  // namespace dimmer::cook

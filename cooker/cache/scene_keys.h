@@ -19,13 +19,13 @@ Key sceneKey(const Scene& scene);
 // Charts and receivers.
 Key chartsKey(const Key& geometry, const UnwrapOptions& options, uint32_t samples_per_texel);
 
-// The settings that a light group's light depends on, and so not how its passes are arranged.
+// The settings that every light group's light depends on, and so neither thresholds nor how passes are arranged.
 Key bakeSettingsKey(const BakeSettings& settings);
 
 // The lamps and emitters of a light group, the always-on group's sky included.
 Key lampsKey(const Scene& scene, uint32_t group);
 
 // A group's finished light.
-Key groupKey(const Key& charts, const Key& settings, const Key& lamps);
+Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps);
 
 }  // namespace dimmer::cook

@@ -10,8 +10,10 @@
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
 #include <pipeline/set_scales.h>
+#include <pipeline/settings.h>
 #include <scene/open_pose.h>
 #include <trace/ray_scene.h>
+#include <update/state_text.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
@@ -19,7 +21,9 @@
 #include <sys/resource.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <chrono>
+#include <sstream>
 
 namespace dimmer::cook {
 namespace {
@@ -183,7 +187,9 @@ Baked bakeWithCache(const Charted& level, const BakeSettings& settings, Progress
     for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) {
         const Key lamps = lampsKey(scene, g);
         cache->dependsOn("lamps of " + describeGroup(scene, g), lamps);
-        keys.push_back(groupKey(level.key, settings_key, lamps));
+        keys.push_back(groupKey(level.key, settings_key, settings.thresholdOf(g), lamps));
+        cache->dependsOn("threshold of " + describeGroup(scene, g),
+                         KeyBuilder("").add(settings.thresholdOf(g)).finish());
     }
     CachedGroups groups(*cache, scene, std::move(keys));
     return bake(*level.rays, level.charts, level.texels, settings, progress, &groups);
@@ -191,17 +197,44 @@ Baked bakeWithCache(const Charted& level, const BakeSettings& settings, Progress
 
 }  // namespace
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
-    return {.series_rays = quality.series_rays,
-            .final_rays = quality.rays,
-            .emitter_samples = quality.emitter_samples,
-            .noise_max = quality.noise,
-            .denoise = quality.denoise != 0,
-            .bounces_max = quality.bounces,
-            .tail_max = quality.tolerance,
-            .threshold = profile.threshold,
-            .light_grid = quality.light_grid,
-            .per_set_passes = quality.per_set_passes};
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene) {
+    BakeSettings settings{.series_rays = quality.series_rays,
+                          .final_rays = quality.rays,
+                          .emitter_samples = quality.emitter_samples,
+                          .noise_max = quality.noise,
+                          .denoise = quality.denoise != 0,
+                          .bounces_max = quality.bounces,
+                          .tail_max = quality.tolerance,
+                          .threshold = profile.threshold,
+                          .light_grid = quality.light_grid,
+                          .per_set_passes = quality.per_set_passes};
+    settings.group_thresholds.assign(1 + scene.light_sets.size(), profile.threshold);
+    for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
+        if (const auto own = profile.set_thresholds.find(scene.light_sets[s].name); own != profile.set_thresholds.end())
+            settings.group_thresholds[1 + s] = own->second;
+    return settings;
+}
+
+Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set) {
+    std::istringstream texts(scene.settings);
+    for (std::string text; std::getline(texts, text, ',');) {
+        text.erase(0, text.find_first_not_of(' '));
+        text.erase(text.find_last_not_of(' ') + 1);
+        if (text.empty()) continue;
+        if (auto ok = assignText(profile, text, scene.file + ": scene: 'dimmer_settings'", "level"); !ok) return ok;
+    }
+    for (const std::string& text : set)
+        if (auto ok = assignText(profile, text, "--set", "command line"); !ok) return ok;
+    std::vector<std::string_view> names;
+    for (const SceneLightSet& s : scene.light_sets) names.push_back(s.name);
+    for (const auto& [name, threshold] : profile.set_thresholds) {
+        if (std::ranges::find(names, name) != names.end()) continue;
+        const std::string_view nearest = nearestName(name, names);
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: '{}{}' names no light set of this level{}", scene.file, set_threshold_prefix, name,
+                                nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+    }
+    return {};
 }
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
@@ -230,7 +263,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Baked baked;
     {
         Stopwatch watch(stats, "bake");
-        const BakeSettings settings = bakeSettings(profile, *quality);
+        const BakeSettings settings = bakeSettings(profile, *quality, scene);
         if (quality->suggest_combinations)
             suggestCombinations(std::move(as_written), profile, charts, texels, settings, progress, stats);
         baked = bakeWithCache(level, settings, progress, cache);
@@ -280,7 +313,7 @@ Key packKey(const Scene& scene, const Profile& profile, const std::string& quali
     const Quality* q = profile.quality(quality);
     const Key settings = KeyBuilder("settings")
                              .add(profile.settingsJson(quality))
-                             .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{})))
+                             .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{}, scene)))
                              .finish();
     cache.dependsOn("level", level);
     cache.dependsOn("settings", settings);
@@ -338,6 +371,8 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     }
     if (!scene) return std::unexpected(scene.error());
     result.stats.warnings = scene->warnings;
+    if (auto ok = resolveSettings(*profile, *scene, options.set); !ok) return std::unexpected(ok.error());
+    result.profile = *profile;
     auto cache = openCache(options, result.stats);
     const auto bytes =
         findOrMakePack(std::move(*scene), *profile, options.quality, progress, cache ? &*cache : nullptr, result);

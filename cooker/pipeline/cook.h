@@ -19,7 +19,8 @@ struct CookOptions {
     std::filesystem::path level, pack;
     std::string profile = "desktop";
     std::string quality = "preview";
-    uint32_t threads = 0;         // 0: as many as the machine has
+    std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
+    uint32_t threads = 0;               // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
     bool suggest_combinations =
         false;                         // measure which pairs of doors the level should name; see suggested_combinations
@@ -44,10 +45,15 @@ struct CookStats {
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats, CookCache* cache = nullptr);
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality);
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
+
+// The profile as this cook uses it: what it says, then the level's `dimmer_settings`, then "key=value" texts. Names of
+// light sets that the level does not have are errors.
+Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set);
 
 struct CookResult {
     PackData pack;
+    Profile profile;  // as resolved
     uint64_t file_bytes = 0;
     CookStats stats;
 };

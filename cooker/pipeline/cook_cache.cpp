@@ -100,8 +100,9 @@ void CookCache::keepPack(const Key& key, const PackEntry& entry) {
 }
 
 std::optional<GroupLight> CookCache::findGroup(const std::string& what, const Key& key) {
-    const auto bytes = find(light_kind, what, key,
-                            {"code", "geometry", "settings of charts", "settings of the bake", "lamps of " + what});
+    const auto bytes = find(
+        light_kind, what, key,
+        {"code", "geometry", "settings of charts", "settings of the bake", "threshold of " + what, "lamps of " + what});
     return bytes ? groupFromBytes(*bytes) : std::nullopt;
 }
 

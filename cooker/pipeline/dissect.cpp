@@ -63,7 +63,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
     bake->paths.emplace(bake->scene);
     bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
-    bake->settings = bakeSettings(settings->profile, quality);
+    bake->settings = bakeSettings(settings->profile, quality, bake->scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
 }

@@ -35,10 +35,12 @@ struct Profile {
     uint32_t page_size = 2048;
     ColorFormat color_format = ColorFormat::E5B9G9R9;
     DirectionModel direction_model = DirectionModel::Ahd;
-    float threshold = 0.01f;  // activity, see BakeSettings
+    float threshold = 0.01f;                      // activity, see BakeSettings
+    std::map<std::string, float> set_thresholds;  // for single light sets, by name
     Quality draft, preview, final;
 
-    // Where each setting's value comes from: a shipped profile's name or a file's; what is not listed: "default".
+    // Where each setting's value comes from: a shipped profile's name or a file's, "level", "command line", "fit"; what
+    // is not listed: "default".
     std::map<std::string, std::string> origin;
 
     const Quality* quality(const std::string& name) const;
