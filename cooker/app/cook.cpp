@@ -17,6 +17,7 @@ struct Arguments {
     std::string json;
     bool no_cache = false, explain_cache = false;
     uint32_t cache_limit_mb = 4096;
+    bool suggest_combinations = false;
 };
 
 // Beside the pack; nowhere where that is a device or a pipe.
@@ -113,7 +114,7 @@ int run(const Arguments& a) {
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack), result->profile);
     if (a.json != "-" && a.explain_cache) printCache(result->stats);
-    if (a.json != "-" && a.options.suggest_combinations)
+    if (a.json != "-" && a.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
 }
@@ -140,8 +141,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
     c->add_flag(
-        "--suggest-combinations", a->options.suggest_combinations,
-        "measure which pairs of doors lose light that needs both, warn, and print them for dimmer_combinations");
+        "--suggest-combinations", a->suggest_combinations,
+        "print the pairs of doors that lose light which needs both (each a warning, too) for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
     c->add_flag_callback(

@@ -2,6 +2,7 @@
 #include <format/layout.h>
 #include <pack/pack_data.h>
 #include <pipeline/budget.h>
+#include <pipeline/contribution_text.h>
 
 #include <fmt/format.h>
 
@@ -19,16 +20,6 @@ struct Arguments {
 
 bool isDoor(const PackData& d, uint32_t element) {
     return d.elements[element].kind == ElementKind::Door;
-}
-
-std::string lightName(const PackData& d, const Contribution& c) {
-    return c.light_set ? d.elements[*c.light_set].name : "always";
-}
-
-std::vector<std::string> names(const PackData& d, const std::vector<uint32_t>& elements) {
-    std::vector<std::string> out;
-    for (uint32_t e : elements) out.push_back(d.elements[e].name);
-    return out;
 }
 
 // {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, and
@@ -58,15 +49,17 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                   {"ancillary", cost.ancillary}, {"meshes", cost.meshes}};
     uint64_t texels = 0;
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n) texels += cost.overlap_histogram[n];
-    j["receivers"] = {{"texels", texels}, {"local_probes", 0}, {"global_probes", 0}};
+    const size_t global_probes = d.probes.global.positions.size();
+    j["receivers"] = {
+        {"texels", texels}, {"local_probes", d.probes.base.size() - global_probes}, {"global_probes", global_probes}};
     j["pages"] = nlohmann::ordered_json::array();
     for (uint32_t p = 0; p < d.page_count; ++p)
         j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
     j["contributions"] = nlohmann::ordered_json::array();
     for (const Contribution& c : d.contributions)
         j["contributions"].push_back({{"light", lightName(d, c)},
-                                      {"doors_open", names(d, c.doors_open)},
-                                      {"doors_closed", names(d, c.doors_closed)},
+                                      {"doors_open", elementNames(d, c.doors_open)},
+                                      {"doors_closed", elementNames(d, c.doors_closed)},
                                       {"receivers", c.receivers},
                                       {"bytes", uint64_t{c.receivers} * sizeof(TexelRecord)},
                                       {"energy_dropped", c.energy_dropped}});

@@ -1,6 +1,7 @@
 #include <bake/bake.h>
 
 #include <bake/denoise.h>
+#include <bake/door_pairs.h>
 #include <bake/final_gather.h>
 #include <bake/group_light.h>
 #include <bake/series.h>

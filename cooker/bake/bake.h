@@ -50,12 +50,22 @@ struct TermReport {
     double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1
 };
 
+// Two doors whose light needs both, while no combination covers them.
+struct DoorPair {
+    uint32_t first = 0, second = 0;  // into Scene::doors
+    // Luminous flux over paths that need both doors, over that which needs only the one of the two with less: what is
+    // lost without the combination.
+    float loss = 0;
+};
+
 struct Baked {
     Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
     std::vector<Term> terms;          // as DoorPaths lists them
     std::vector<TermReport> reports;  // per term
     uint32_t bounces = 0;             // of the light group that took most
     uint64_t rays = 0;                // traced, not remembered
+    std::vector<DoorFlux> door_flux;        // per light group
+    std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
 };
 

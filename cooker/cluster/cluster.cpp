@@ -1,6 +1,7 @@
 #include <cluster/cluster.h>
 
 #include <encode/encode.h>
+#include <pack/batches.h>
 
 #include <algorithm>
 #include <map>
@@ -42,8 +43,8 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
               .batch_count = 0,
               .first_term = static_cast<uint32_t>(pack.terms.size()),
               .term_count = static_cast<uint32_t>(contributions.size())};
-    for (uint32_t first = 0; first < receivers; first += batch_receivers_max, ++c.batch_count)
-        pack.batches.push_back({c.first_receiver + first, std::min(batch_receivers_max, receivers - first)});
+    cutIntoBatches(pack.addresses, c.first_receiver, pack.batches);
+    c.batch_count = static_cast<uint32_t>(pack.batches.size()) - c.first_batch;
     for (uint32_t k : contributions) {
         pack.terms.push_back({k, pack.contributions[k].receivers});  // relative to the contribution for now
         pack.contributions[k].receivers += receivers;
@@ -58,23 +59,24 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     const std::vector<Target> targets = listTargets(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
-    std::map<std::vector<uint32_t>, std::vector<uint32_t>> members;  // contributions -> targets
-    std::vector<uint32_t> signature;
+    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
+    std::map<Signature, std::vector<uint32_t>> members;            // -> targets
+    Signature signature;
     for (uint32_t t = 0; t < targets.size(); ++t) {
-        signature.clear();
+        signature = {{}, TexelAddress::page(targets[t].address)};
         for (const ReceiverLight& l : baked.light.row(targets[t].source)) {
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
             else
-                signature.push_back(contribution_of_term[l.term]);
+                signature.first.push_back(contribution_of_term[l.term]);
         }
-        if (!signature.empty()) members[signature].push_back(t);
+        if (!signature.first.empty()) members[signature].push_back(t);
     }
     // Clusters by their number of contributions, as updates take them, and in page order among equals: what a dispatch
     // reads lies together, and neighbours in the file are neighbours on the page.
-    std::vector<const std::pair<const std::vector<uint32_t>, std::vector<uint32_t>>*> order;
+    std::vector<const std::pair<const Signature, std::vector<uint32_t>>*> order;
     for (const auto& cluster : members) order.push_back(&cluster);
-    std::ranges::sort(order, {}, [](const auto* c) { return std::pair(c->first.size(), c->second.front()); });
+    std::ranges::sort(order, {}, [](const auto* c) { return std::pair(c->first.first.size(), c->second.front()); });
 
     std::vector<std::vector<TexelRecord>> payloads(pack.contributions.size());
     for (const auto* cluster : order) {
@@ -84,7 +86,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
                 if (l.term != always_group)
                     payloads[contribution_of_term[l.term]].push_back(encodeTexel(l.light, encoding));
         }
-        appendCluster(cluster->first, static_cast<uint32_t>(cluster->second.size()), pack);
+        appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), pack);
     }
     std::vector<uint32_t> first_record;
     for (const auto& payload : payloads) {

@@ -22,9 +22,7 @@ struct CookOptions {
     std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
     uint32_t threads = 0;               // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
-    bool suggest_combinations =
-        false;                         // measure which pairs of doors the level should name; see suggested_combinations
-    bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
+    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
 };
@@ -34,7 +32,7 @@ struct CookStats {
     uint64_t rays = 0;
     uint32_t bounces = 0;
     uint64_t peak_bytes = 0;  // of the whole process
-    // For `dimmer_combinations`: names of doors as the level writes them. Empty unless asked for.
+    // For `dimmer_combinations`: pairs of doors, as the level writes them, that lose light for want of it.
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;
     std::vector<CacheLine> cache;  // per stage that a cache could keep; empty without one

@@ -25,7 +25,6 @@ struct Quality {
     float tolerance = 0.002f;           // bounces stop when what is still to come is below this share of the sum
     bool per_set_passes = false;        // see BakeSettings; from the command line alone
     bool light_grid = true;             // likewise
-    bool suggest_combinations = false;  // likewise; see CookOptions
 };
 
 struct Profile {

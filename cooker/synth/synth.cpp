@@ -1,9 +1,11 @@
 #include <synth/synth.h>
 
+#include <probes/tetrahedra.h>
 #include <synth/regions.h>
 
 #include <fmt/format.h>
 #include <format/texel.h>
+#include <pack/batches.h>
 
 #include <algorithm>
 #include <array>
@@ -81,16 +83,16 @@ void addCluster(const std::vector<uint32_t>& contributions, std::span<const uint
     Cluster cluster{.first_receiver = static_cast<uint32_t>(pack.addresses.size()),
                     .receiver_count = count,
                     .first_batch = static_cast<uint32_t>(pack.batches.size()),
-                    .batch_count = (count + batch_receivers_max - 1) / batch_receivers_max,
+                    .batch_count = 0,
                     .first_term = static_cast<uint32_t>(pack.terms.size()),
                     .term_count = static_cast<uint32_t>(contributions.size())};
-    for (uint32_t first = 0; first < count; first += batch_receivers_max)
-        pack.batches.push_back({cluster.first_receiver + first, std::min(batch_receivers_max, count - first)});
     for (uint32_t k : contributions) {
         pack.terms.push_back({k, pack.contributions[k].receivers});  // within the contribution, for now
         pack.contributions[k].receivers += count;
     }
     pack.addresses.insert(pack.addresses.end(), addresses.begin(), addresses.end());
+    cutIntoBatches(pack.addresses, cluster.first_receiver, pack.batches);
+    cluster.batch_count = static_cast<uint32_t>(pack.batches.size()) - cluster.first_batch;
     pack.clusters.push_back(cluster);
 }
 
@@ -155,6 +157,48 @@ void addProbes(const SynthOptions& options, SynthRandom& random, PackData& pack)
     for (ProbeRecord& record : probes.payload) record = randomProbe(random);
 }
 
+constexpr uint32_t storeys = 6;  // layers of the global grid: levels are wider than high
+
+// Of the probes, in the order of their numbers: a jittered lattice of 1 m in storeys, and the corners of the box.
+Expected<GlobalGrid> randomGrid(size_t probes, SynthRandom& random) {
+    const size_t inside = probes - std::min<size_t>(probes, 8);
+    const auto side = std::max<size_t>(1, static_cast<size_t>(std::sqrt(static_cast<double>(inside) / storeys)));
+    std::vector<glm::vec3> points(inside);
+    glm::vec3 size(0);
+    for (size_t i = 0; i < inside; ++i) {
+        const glm::vec3 cell(i % side, i / side % storeys, i / side / storeys);
+        points[i] =
+            cell + glm::vec3(uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f));
+        size = glm::max(size, cell);
+    }
+    return tetrahedralise(points, {glm::vec3(0), size});
+}
+
+// Models that stand about, with 3 x 2 x 3 probes each; what is left over is one in a row.
+void addLocalGrids(PackData& pack, SynthRandom& random) {
+    const auto end = static_cast<uint32_t>(pack.probes.base.size());
+    const StartGrid& box = pack.probes.global.start;
+    for (auto first = static_cast<uint32_t>(pack.probes.global.positions.size()); first < end;) {
+        LocalGrid grid{
+            .node = fmt::format("model{}", pack.probes.local.size()), .first_probe = first, .counts = {3, 2, 3}};
+        if (end - first < grid.probeCount()) grid.counts = {end - first, 1, 1};
+        for (size_t axis = 0; axis < 3; ++axis) {
+            grid.origin_m[axis] = uniform(random, box.min_m[axis], box.max_m[axis]);
+            grid.step_m[axis][axis] = 1;
+        }
+        first += static_cast<uint32_t>(grid.probeCount());
+        pack.probes.local.push_back(std::move(grid));
+    }
+}
+
+Expected<void> addGrids(const SynthOptions& options, SynthRandom& random, PackData& pack) {
+    auto grid = randomGrid(static_cast<size_t>(std::llround(options.level.global_probes * options.scale)), random);
+    if (!grid) return std::unexpected(grid.error());
+    pack.probes.global = std::move(*grid);
+    addLocalGrids(pack, random);
+    return {};
+}
+
 std::string settingsOf(const SynthOptions& options) {
     const auto entry = [](const auto& value) {
         return nlohmann::ordered_json{{"value", value}, {"from", "command line"}};
@@ -211,10 +255,19 @@ Expected<PackData> synthesise(const SynthOptions& options) {
     for (const auto& list : addresses) sizes.push_back(static_cast<uint32_t>(list.size()));
     const auto overlaps = fitOverlaps(sizes, mean, options.clusters, std::min(overlap_max, contributions), random);
     const auto members = nearestContributions(regions, overlaps, contributions, random);
-    for (uint32_t i : byOverlap(members))
-        if (!members[i].empty() && !addresses[i].empty()) addCluster(members[i], addresses[i], pack);
+    for (uint32_t i : byOverlap(members)) {
+        if (members[i].empty()) continue;
+        for (auto left = std::span(addresses[i]); !left.empty();) {
+            const size_t count = countOnPage(left);
+            addCluster(members[i], left.first(count), pack);
+            left = left.subspan(count);
+        }
+    }
     addRecords(random, pack);
-    if (options.probes) addProbes(options, random, pack);
+    if (options.probes) {
+        addProbes(options, random, pack);
+        if (auto ok = addGrids(options, random, pack); !ok) return std::unexpected(ok.error());
+    }
     pack.settings_json = settingsOf(options);
     return pack;
 }

@@ -41,7 +41,7 @@ class Writer {
             addArray(ChunkType::Payload, std::span(d_.payload).subspan(first, d_.contributions[k].receivers), k);
             first += d_.contributions[k].receivers;
         }
-        if (!d_.probes.base.empty()) addProbes(d_.probes);
+        if (!d_.probes.base.empty() || !d_.probes.local.empty()) addProbes(d_.probes);
         addTable(ChunkType::Meshes, [&](ByteWriter& out) { putMeshes(out); });
         addTable(ChunkType::Viewpoints, [&](ByteWriter& out) { putViewpoints(out); });
         addTable(ChunkType::Settings, [&](ByteWriter& out) { out.putString(d_.settings_json); });
@@ -100,6 +100,13 @@ class Writer {
         addArray(ChunkType::ProbeNumbers, std::span(probes.numbers));
         addArray(ChunkType::ProbeCounts, std::span(probes.record_counts));
         addArray(ChunkType::ProbePayload, std::span(probes.payload));
+        addArray(ChunkType::GridPositions, std::span(probes.global.positions));
+        addArray(ChunkType::GridLevels, std::span(probes.global.levels));
+        addArray(ChunkType::GridTetrahedra, std::span(probes.global.tetrahedra));
+        addArray(ChunkType::GridVisibility, std::span(probes.global.visibility));
+        addArray(ChunkType::GridStarts, std::span(probes.global.starts));
+        addTable(ChunkType::GridBox, [&](ByteWriter& out) { out.put(probes.global.start); });
+        addTable(ChunkType::LocalGrids, [&](ByteWriter& out) { putLocalGrids(out); });
     }
 
     void addTable(ChunkType type, auto&& fill) {
@@ -129,6 +136,17 @@ class Writer {
             out.putArray(std::span<const uint32_t>(c.doors_closed));
             out.put(c.receivers);
             out.put(c.energy_dropped);
+        }
+    }
+
+    void putLocalGrids(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.probes.local.size()));
+        for (const LocalGrid& grid : d_.probes.local) {
+            out.putString(grid.node);
+            out.put(grid.first_probe);
+            out.put(grid.counts);
+            out.put(grid.origin_m);
+            out.put(grid.step_m);
         }
     }
 

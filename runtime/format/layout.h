@@ -8,7 +8,7 @@
 namespace dimmer::format {
 
 inline constexpr std::array<char, 8> magic = {'D', 'I', 'M', 'M', 'E', 'R', '\r', '\n'};
-inline constexpr uint32_t version = 3;
+inline constexpr uint32_t version = 4;
 inline constexpr uint32_t endian_tag = 0x01020304;
 inline constexpr uint64_t chunk_alignment_bytes = 64;
 
@@ -34,6 +34,13 @@ enum class ChunkType : uint32_t {
     ProbeNumbers = fourcc("PNUM"),
     ProbeCounts = fourcc("PCNT"),
     ProbePayload = fourcc("PPAY"),
+    GridPositions = fourcc("GPOS"),
+    GridLevels = fourcc("GLEV"),
+    GridTetrahedra = fourcc("GTET"),
+    GridVisibility = fourcc("GVIS"),
+    GridStarts = fourcc("GSTA"),
+    GridBox = fourcc("GBOX"),
+    LocalGrids = fourcc("LGRD"),
     Meshes = fourcc("MESH"),
     Viewpoints = fourcc("VIEW"),
     Settings = fourcc("SETT"),

@@ -10,6 +10,8 @@
 
 #include <format/texel.h>
 
+#include <span>
+
 namespace dimmer {
 
 inline constexpr uint32_t probe_codes = 24, probe_words = 6;
@@ -57,6 +59,12 @@ struct ProbeBlend {
 // What executors see of a record: no infinities, no NaN.
 inline ProbeRecord canonicalProbe(ColorFormat format, const ProbeRecord& record) {
     return {canonical(format, {record.light, 0}).irradiance, record.bands};
+}
+
+// Of blended probes, 7 words each.
+inline ProbeRecord probeAt(std::span<const uint32_t> words, uint32_t number) {
+    const uint32_t* w = &words[size_t{1 + probe_words} * number];
+    return {w[0], {w[1], w[2], w[3], w[4], w[5], w[6]}};
 }
 
 }  // namespace dimmer

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <dimmer/pack.h>
+#include <pack/grid_data.h>
 
 #include <array>
 #include <cstdint>
@@ -74,6 +75,8 @@ struct ProbeData {
     std::vector<uint32_t> numbers;        // per receiver, the probe that it is
     std::vector<uint32_t> record_counts;  // per contribution; empty where there are no receivers
     std::vector<ProbeRecord> payload;     // contribution-major
+    GlobalGrid global;                    // of the first probes
+    std::vector<LocalGrid> local;         // of the others
     ReceiverView view() const { return {clusters, terms, batches, sizeof(ProbeRecord)}; }
 };
 

@@ -87,8 +87,10 @@ class Reader {
         if (header_.magic != format::magic) return bad("this is not a Dimmer pack");
         if (header_.endian_tag != format::endian_tag) return bad("the pack's byte order is not little-endian");
         if (header_.version != format::version)
-            return bad("the pack is of format version {}, this build reads version {}", header_.version,
-                       format::version);
+            return fail(ErrorCode::BadInput,
+                        fmt::format("the pack is of format version {}, this build reads version {}; cook the level "
+                                    "again with this build, or use the one that wrote the pack",
+                                    header_.version, format::version));
         if (header_.file_bytes != file_.size())
             return bad("the file has {} bytes, its header says {}", file_.size(), header_.file_bytes);
         return {};
@@ -135,6 +137,13 @@ class Reader {
             case ChunkType::ProbeNumbers:
             case ChunkType::ProbeCounts:
             case ChunkType::ProbePayload:
+            case ChunkType::GridPositions:
+            case ChunkType::GridLevels:
+            case ChunkType::GridTetrahedra:
+            case ChunkType::GridVisibility:
+            case ChunkType::GridStarts:
+            case ChunkType::GridBox:
+            case ChunkType::LocalGrids:
             case ChunkType::Meshes:
             case ChunkType::Viewpoints:
             case ChunkType::Settings:
@@ -210,7 +219,33 @@ class Reader {
         if (ok) ok = array(ChunkType::ProbeNumbers, d.probes.numbers);
         if (ok) ok = array(ChunkType::ProbeCounts, d.probes.record_counts);
         if (ok) ok = array(ChunkType::ProbePayload, d.probes.payload);
+        if (ok) ok = readGlobalGrid(d.probes.global);
+        if (ok) ok = table(ChunkType::LocalGrids, [&](ByteReader& in) { readLocalGrids(in, d); });
         return ok;
+    }
+
+    Expected<void> readGlobalGrid(GlobalGrid& grid) {
+        Expected<void> ok = array(ChunkType::GridPositions, grid.positions);
+        if (ok) ok = array(ChunkType::GridLevels, grid.levels);
+        if (ok) ok = array(ChunkType::GridTetrahedra, grid.tetrahedra);
+        if (ok) ok = array(ChunkType::GridVisibility, grid.visibility);
+        if (ok) ok = array(ChunkType::GridStarts, grid.starts);
+        if (ok) ok = table(ChunkType::GridBox, [&](ByteReader& in) { grid.start = in.get<StartGrid>(); });
+        return ok;
+    }
+
+    static void readLocalGrids(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 68)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            LocalGrid grid;
+            grid.node = in.getString();
+            grid.first_probe = in.get<uint32_t>();
+            grid.counts = in.get<std::array<uint32_t, 3>>();
+            grid.origin_m = in.get<std::array<float, 3>>();
+            grid.step_m = in.get<std::array<std::array<float, 3>, 3>>();
+            d.probes.local.push_back(std::move(grid));
+        }
     }
 
     static void readElements(ByteReader& in, PackData& d) {

@@ -1,6 +1,6 @@
-#include <pack/pack_data.h>
-
 #include <fmt/format.h>
+#include <pack/batches.h>
+#include <pack/pack_data.h>
 
 #include <algorithm>
 #include <cmath>
@@ -131,6 +131,21 @@ Expected<void> validateClusters(const Kind& kind) {
     return {};
 }
 
+// What lets a kernel find a batch's texels by a byte each, and take them two at a time; see pack/batches.h.
+Expected<void> validateBatchTiles(const PackData& d) {
+    for (const Cluster& c : d.clusters)
+        for (uint32_t b = c.first_batch; b < c.first_batch + c.batch_count; ++b) {
+            const Batch& batch = d.batches[b];
+            BatchTiles tiles;
+            for (uint32_t i = 0; i < batch.receiver_count; ++i)
+                if (!tiles.add(d.addresses[batch.first_receiver + i]))
+                    return bad("batch {} lies in more than {} tiles of one page", b, batch_tiles_max);
+            if (batch.receiver_count % 2 != 0 && b + 1 < c.first_batch + c.batch_count)
+                return bad("batch {} has an odd number of receivers and is not its cluster's last", b);
+        }
+    return {};
+}
+
 Expected<void> validateTexels(const PackData& d) {
     Kind kind{d.texelView(), d.addresses.size(), {}};
     for (const Contribution& c : d.contributions) kind.record_counts.push_back(c.receivers);
@@ -157,6 +172,61 @@ Expected<void> validateProbes(const PackData& d) {
     }
     if (auto ok = validateClusters(kind); !ok) return ok;
     return validateTerms(kind);
+}
+
+Expected<void> validateTetrahedra(const GlobalGrid& grid) {
+    const size_t probes = grid.positions.size(), count = grid.tetrahedra.size();
+    if (!grid.visibility.empty() && grid.visibility.size() != count)
+        return bad("its visibility is of {} tetrahedra, not {}", grid.visibility.size(), count);
+    for (size_t i = 0; i < count; ++i) {
+        const Tetrahedron& t = grid.tetrahedra[i];
+        for (const uint32_t probe : t.probes)
+            if (probe >= probes) return bad("tetrahedron {} has probe {} of {}", i, probe, probes);
+        for (const uint32_t neighbour : t.neighbours)
+            if (neighbour >= count && neighbour != no_tetrahedron)
+                return bad("tetrahedron {} has neighbour {} of {}", i, neighbour, count);
+    }
+    for (const uint32_t start : grid.starts)
+        if (start >= count) return bad("a walk starts in tetrahedron {} of {}", start, count);
+    return {};
+}
+
+// With this a walk is safe: it takes a bounded number of steps, and every number that it meets is in range and finite.
+Expected<void> validateGlobalGrid(const PackData& d) {
+    const GlobalGrid& grid = d.probes.global;
+    if (grid.positions.size() > d.probes.base.size() || grid.levels.size() != grid.positions.size())
+        return bad("its global grid has {} places and {} levels for {} probes", grid.positions.size(),
+                   grid.levels.size(), d.probes.base.size());
+    for (const ProbePosition& p : grid.positions)
+        if (!std::isfinite(p.x_m) || !std::isfinite(p.y_m) || !std::isfinite(p.z_m))
+            return bad("a probe stands nowhere");
+    const StartGrid& start = grid.start;
+    if (!finite(start.min_m) || !finite(start.max_m)) return bad("its global grid's box is not finite");
+    uint64_t cells = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        if (!grid.empty() && !(start.min_m[axis] < start.max_m[axis])) return bad("its global grid's box is flat");
+        // Each factor is at most the number of cells that are there, so that the product cannot overflow.
+        if (start.counts[axis] > grid.starts.size()) return bad("its starts of walks do not fill their box");
+        cells = std::min<uint64_t>(cells * start.counts[axis], UINT32_MAX);
+    }
+    if (grid.starts.size() != cells || (grid.empty() != grid.starts.empty()))
+        return bad("its starts of walks do not fill their box");
+    return validateTetrahedra(grid);
+}
+
+Expected<void> validateLocalGrids(const PackData& d) {
+    for (const LocalGrid& grid : d.probes.local) {
+        if (!std::ranges::all_of(grid.counts, [](uint32_t n) { return n >= 1 && n <= local_grid_side_max; }))
+            return bad("local grid '{}' has {} x {} x {} probes", grid.node, grid.counts[0], grid.counts[1],
+                       grid.counts[2]);
+        if (!finite(grid.origin_m) || !std::ranges::all_of(grid.step_m, [](const auto& s) { return finite(s); }))
+            return bad("local grid '{}' is not finite", grid.node);
+        const uint64_t first = d.probes.global.positions.size(), end = d.probes.base.size();
+        if (grid.first_probe != no_probe &&
+            (grid.first_probe < first || grid.first_probe > end || grid.probeCount() > end - grid.first_probe))
+            return bad("local grid '{}' has probes that are not there", grid.node);
+    }
+    return {};
 }
 
 Expected<void> validateAddresses(const PackData& d) {
@@ -198,7 +268,7 @@ Expected<void> validateMeshes(const PackData& d) {
 
 Expected<void> validate(const PackData& data) {
     for (auto* check : {validatePages, validateElements, validateContributions, validateTexels, validateAddresses,
-                        validateProbes, validateMeshes})
+                        validateBatchTiles, validateProbes, validateGlobalGrid, validateLocalGrids, validateMeshes})
         if (auto ok = check(data); !ok) return ok;
     return {};
 }

@@ -91,6 +91,18 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 
 }  // namespace
 
+Expected<LightSet> findLightSet(const Pack& pack, std::string_view name) {
+    const auto index = lookUp(pack.elements(), ElementKind::LightSet, name);
+    if (!index) return std::unexpected(index.error());
+    return LightSet{*index};
+}
+
+Expected<Door> findDoor(const Pack& pack, std::string_view name) {
+    const auto index = lookUp(pack.elements(), ElementKind::Door, name);
+    if (!index) return std::unexpected(index.error());
+    return Door{*index};
+}
+
 LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack), held_(pack.elements().size()) {
     const PackData& data = pack_.data();
     const auto add = [&](const ReceiverView& receivers, std::vector<std::unique_ptr<Planner>>& planners) {
@@ -127,15 +139,11 @@ void LightState::hold(LightSet set, bool held) {
 }
 
 Expected<LightSet> LightState::lightSet(std::string_view name) const {
-    const auto index = lookUp(pack_.elements(), ElementKind::LightSet, name);
-    if (!index) return std::unexpected(index.error());
-    return LightSet{*index};
+    return findLightSet(pack_, name);
 }
 
 Expected<Door> LightState::door(std::string_view name) const {
-    const auto index = lookUp(pack_.elements(), ElementKind::Door, name);
-    if (!index) return std::unexpected(index.error());
-    return Door{*index};
+    return findDoor(pack_, name);
 }
 
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {

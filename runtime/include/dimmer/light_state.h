@@ -21,6 +21,10 @@ struct Door {
     uint32_t element = 0;
 };
 
+// Without a runtime. NotFound names the nearest.
+Expected<LightSet> findLightSet(const Pack& pack, std::string_view name);
+Expected<Door> findDoor(const Pack& pack, std::string_view name);
+
 // How strongly a light set shines, per linear Rec.709 channel; 1 is as baked. A scalar dims, three numbers recolour.
 struct Weight {
     float r = 1, g = 1, b = 1;

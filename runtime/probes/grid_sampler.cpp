@@ -1,0 +1,62 @@
+#include <dimmer/probe_grid.h>
+
+#include <format/probe.h>
+#include <pack/pack_data.h>
+#include <probes/spherical_harmonics.h>
+#include <probes/tetrahedron_walk.h>
+
+#include <algorithm>
+#include <bit>
+
+namespace dimmer {
+namespace {
+
+// Adds weight * the light of a probe.
+void add(const ProbeRecord& record, ColorFormat format, float weight, Radiance& sum) {
+    const auto light = decodeColor(format, canonicalProbe(format, record).light);
+    const auto codes = std::bit_cast<std::array<int8_t, probe_codes>>(record.bands);
+    for (size_t c = 0; c < 3; ++c) {
+        const float dc = weight * light[c];
+        sum.coefficients[0][c] += dc;
+        for (size_t i = 1; i < sh_count; ++i)
+            sum.coefficients[i][c] +=
+                dc * band_bounds[bandOf(i)] * (static_cast<float>(codes[3 * (i - 1) + c]) / 127.0f);
+    }
+}
+
+}  // namespace
+
+std::array<float, 3> irradiance(const Radiance& radiance, std::array<float, 3> normal) {
+    const auto y = sphericalHarmonics(normal);
+    std::array<float, 3> sum = {};
+    for (size_t i = 0; i < sh_count; ++i)
+        for (size_t c = 0; c < 3; ++c) sum[c] += cosine_bands[bandOf(i)] * y[i] * radiance.coefficients[i][c];
+    for (float& v : sum) v = std::max(v, 0.0f);
+    return sum;
+}
+
+bool GridSampler::empty() const {
+    return pack_.data().probes.global.empty();
+}
+
+Radiance GridSampler::radiance(std::array<float, 3> point_m, GridHint* hint) const {
+    Radiance sum;
+    if (empty()) return sum;
+    const PackData& data = pack_.data();
+    const GlobalGrid& grid = data.probes.global;
+    const GridPlace place = locate(grid, point_m, hint ? hint->tetrahedron : no_tetrahedron);
+    if (hint) hint->tetrahedron = place.tetrahedron;
+    const auto weights = probeWeights(grid, place);
+    for (size_t i = 0; i < 4; ++i) {
+        const ProbeRecord record = probeAt(probes_, grid.tetrahedra[place.tetrahedron].probes[i]);
+        add(record, data.color_format, weights[i] / data.exposure, sum);
+    }
+    return sum;
+}
+
+std::array<float, 3> GridSampler::sample(std::array<float, 3> point_m, std::array<float, 3> normal,
+                                         GridHint* hint) const {
+    return irradiance(radiance(point_m, hint), normal);
+}
+
+}  // namespace dimmer

@@ -1,0 +1,37 @@
+// From a point to the probes of the global grid that light it. Every number is a 32-bit float and every operation +, -,
+// * or /, in the order written, so that a shader can give the same bits.
+#pragma once
+
+#include <pack/grid_data.h>
+
+#include <array>
+#include <cstdint>
+
+namespace dimmer {
+
+// A walk from a hint takes at most this many steps before it starts anew at the start grid, and at most so many there:
+// models move a little at a time, and a start cell holds few tetrahedra. No table can make a walk longer.
+inline constexpr uint32_t hinted_steps_max = 32, walk_steps_max = 1024;
+// A barycentric coordinate above -this counts as inside. Rounding errs by some 1e-6 in tetrahedra that are not slivers;
+// the light jumps by at most this share where two tetrahedra disagree.
+inline constexpr float inside_tolerance = 1e-4f;
+// Visible light fades in over 1 / this of the field's range, on the visible side: a plane through the open air shows
+// no edge, and nothing shines past it.
+inline constexpr float visibility_slope = 8;
+// With less than this in sight a point counts as seen by none.
+inline constexpr float visible_weight_min = 1e-5f;
+
+struct GridPlace {
+    uint32_t tetrahedron = 0;
+    std::array<float, 4> barycentric = {};  // of its probes: 0..1, sum 1
+};
+
+// `hint`: a tetrahedron that is likely near, or no_tetrahedron. A point outside the grid's box gets the place of the
+// box's nearest point, one that is not a number some place. The grid is not empty. Thread-safe.
+GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint = no_tetrahedron);
+
+// The shares of the four probes in the light at a place: barycentric among those that see it, or among all when none
+// does. Each 0..1, sum 1.
+std::array<float, 4> probeWeights(const GlobalGrid& grid, const GridPlace& place);
+
+}  // namespace dimmer
