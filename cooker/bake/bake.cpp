@@ -30,6 +30,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
             if (!settings.per_set_passes) traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row);
             for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
                 traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
+            for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));
         }
         all_traced += traced;
@@ -59,6 +60,7 @@ std::vector<uint32_t> bakeGroups(const Gatherer& gatherer, const BakeSettings& s
                                  std::span<const uint8_t> groups, Progress& progress, Baked& baked) {
     Series series = expandSeries(gatherer, settings, progress, groups);
     baked.rays = series.rays;
+    baked.door_flux = doorFlux(gatherer, series, settings, groups, progress);
     baked.light = gatherAll(gatherer, series, settings, groups, progress, baked.rays);
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
@@ -84,6 +86,7 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
     Baked baked;
     baked.terms = paths.terms();
     baked.reports.resize(paths.termCount());
+    baked.door_flux.resize(paths.groupCount());
     if (std::ranges::count(missing, 1) > 0) {
         const EmitterSampler emitters(rays, meshGroups(rays.scene()));
         const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
@@ -94,6 +97,7 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
         baked.light = Sparse<ReceiverLight>::Builder(texels.size()).finish();
     }
     addGroups(found, baked);
+    baked.dependent_doors = dependentDoors(baked.door_flux, settings);
     if (baked.bounces == settings.bounces_max)
         baked.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
     return baked;

@@ -28,6 +28,10 @@ struct BakeSettings {
     // measuring against.
     bool per_set_passes = false;
 
+    // Per light group, how bright it is in the level, where the scene has it at another scale: by this the groups count
+    // together when pairs of doors are judged. Empty: as the scene has them.
+    std::vector<float> group_brightness = {};
+
     float thresholdOf(uint32_t group) const { return group_thresholds.empty() ? threshold : group_thresholds[group]; }
 };
 
@@ -36,6 +40,7 @@ struct ReceiverLight {
     uint32_t term = 0;
     Gathered light;
     float variance = 0;  // of the luminance of the irradiance, lux^2; Monte Carlo noise alone
+    float keep = 0;      // the largest activity threshold at which it is stored; infinite for always-on light
 };
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
@@ -58,12 +63,22 @@ struct DoorPair {
     float loss = 0;
 };
 
+// Luminous flux of one light group over paths that need doors, lm: by it pairs of doors are judged.
+struct DoorFlux {
+    struct Pair {
+        uint32_t first = 0, second = 0;
+        double flux = 0;  // needs both
+    };
+    std::vector<double> alone;  // per door, needs it and no other
+    std::vector<Pair> pairs;    // that some surface sees together and no combination covers
+};
+
 struct Baked {
-    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
-    std::vector<Term> terms;          // as DoorPaths lists them
-    std::vector<TermReport> reports;  // per term
-    uint32_t bounces = 0;             // of the light group that took most
-    uint64_t rays = 0;                // traced, not remembered
+    Sparse<ReceiverLight> light;            // per receiver: always-on light first, then the active terms
+    std::vector<Term> terms;                // as DoorPaths lists them
+    std::vector<TermReport> reports;        // per term
+    uint32_t bounces = 0;                   // of the light group that took most
+    uint64_t rays = 0;                      // traced, not remembered
     std::vector<DoorFlux> door_flux;        // per light group
     std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
@@ -74,6 +89,7 @@ struct Baked {
 struct GroupLight {
     Sparse<ReceiverLight> light;      // per receiver; `term` counts the group's own terms, variances are 0
     std::vector<TermReport> reports;  // per term of the group
+    DoorFlux door_flux;
     uint32_t bounces = 0;
 };
 

@@ -16,6 +16,7 @@ std::vector<std::vector<uint32_t>> termsOfGroups(const std::vector<Term>& terms,
 GroupLight lightOfGroup(const Baked& baked, uint32_t group, uint32_t bounces) {
     GroupLight out;
     out.bounces = bounces;
+    out.door_flux = baked.door_flux[group];
     std::vector<uint32_t> own_index(baked.terms.size(), no_term);
     for (uint32_t t = 0; t < baked.terms.size(); ++t) {
         if (baked.terms[t].group != group) continue;
@@ -27,7 +28,7 @@ GroupLight lightOfGroup(const Baked& baked, uint32_t group, uint32_t bounces) {
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (const ReceiverLight& l : baked.light.row(i))
-                if (own_index[l.term] != no_term) row.push_back({own_index[l.term], l.light, 0});
+                if (own_index[l.term] != no_term) row.push_back({own_index[l.term], l.light, 0, l.keep});
             emit(std::span<const ReceiverLight>(row));
         }
     });
@@ -42,6 +43,7 @@ void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) 
         if (!groups[g]) continue;
         added.push_back(&*groups[g]);
         group_of.push_back(g);
+        baked.door_flux[g] = groups[g]->door_flux;
         baked.bounces = std::max(baked.bounces, groups[g]->bounces);
         for (size_t k = 0; k < terms[g].size(); ++k) baked.reports[terms[g][k]] = groups[g]->reports[k];
     }
@@ -53,7 +55,7 @@ void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) 
             row.assign(here.begin(), here.end());
             for (size_t a = 0; a < added.size(); ++a)
                 for (const ReceiverLight& l : added[a]->light.row(i))
-                    row.push_back({terms[group_of[a]][l.term], l.light, 0});
+                    row.push_back({terms[group_of[a]][l.term], l.light, 0, l.keep});
             std::ranges::sort(row, {}, &ReceiverLight::term);
             emit(std::span<const ReceiverLight>(row));
         }

@@ -276,6 +276,10 @@ class Expansion {
 
     void decideActivity() {
         out_.reports = thresholds(1);
+        for (uint32_t t = 0; t < terms_; ++t) {
+            const float share = settings_.thresholdOf(paths_.terms()[t].group);
+            out_.threshold_base.push_back(share > 0 ? out_.reports[t].threshold_lux / share : 0.0f);
+        }
         std::vector<double> dropped(terms_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
             const double energy = static_cast<double>(texels_.area_m2[i] * stored);
@@ -334,6 +338,15 @@ bool Series::active(uint32_t term, float direct_lux, float bounced_lux) const {
     const float threshold = reports[term].threshold_lux;
     return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
            (bounced_lux > 0 && bounced_lux >= threshold);
+}
+
+float Series::keepUpTo(size_t receiver, uint32_t term) const {
+    float brightest = 0;
+    for (const auto* part : {&direct, &bounced})
+        for (const TermLight& l : part->row(receiver))
+            if (l.term == term) brightest = std::max(brightest, luminance(l.value));
+    const float base = term == always_group ? 0 : threshold_base[term];
+    return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
 }
 
 void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {

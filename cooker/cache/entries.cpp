@@ -68,8 +68,13 @@ std::vector<float> getFloats(ByteReader& in) {
     return values;
 }
 
-constexpr size_t floats_per_light = 7;
-static_assert(sizeof(Gathered) == floats_per_light * sizeof(float));
+// What is kept of a ReceiverLight, besides its term.
+struct StoredLight {
+    Gathered light;
+    float keep;
+};
+constexpr size_t floats_per_light = 8;
+static_assert(sizeof(StoredLight) == floats_per_light * sizeof(float));
 
 }  // namespace
 
@@ -119,7 +124,7 @@ std::vector<std::byte> toBytes(const GroupLight& group) {
         counts.push_back(static_cast<uint16_t>(group.light.row(i).size()));
         for (const ReceiverLight& l : group.light.row(i)) {
             terms.push_back(static_cast<uint16_t>(l.term));
-            const auto values = std::bit_cast<std::array<float, floats_per_light>>(l.light);
+            const auto values = std::bit_cast<std::array<float, floats_per_light>>(StoredLight{l.light, l.keep});
             for (size_t f = 0; f < floats_per_light; ++f) columns[f * group.light.entryCount() + n] = values[f];
             ++n;
         }
@@ -127,6 +132,8 @@ std::vector<std::byte> toBytes(const GroupLight& group) {
     ByteWriter out;
     out.put(group.bounces);
     putAll(out, group.reports);
+    putAll(out, group.door_flux.alone);
+    putAll(out, group.door_flux.pairs);
     putAll(out, counts);
     putAll(out, terms);
     putFloats(out, columns);
@@ -138,6 +145,8 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
     GroupLight group;
     group.bounces = in.get<uint32_t>();
     group.reports = in.getArray<TermReport>();
+    group.door_flux.alone = in.getArray<double>();
+    group.door_flux.pairs = in.getArray<DoorFlux::Pair>();
     const auto counts = in.getArray<uint16_t>();
     const auto terms = in.getArray<uint16_t>();
     const std::vector<float> columns = getFloats(in);
@@ -152,7 +161,8 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
             std::array<float, floats_per_light> values;
             for (size_t f = 0; f < floats_per_light; ++f) values[f] = columns[f * terms.size() + n];
             if (terms[n] >= group.reports.size()) return {};
-            row.push_back({terms[n], std::bit_cast<Gathered>(values), 0});
+            const auto stored = std::bit_cast<StoredLight>(values);
+            row.push_back({terms[n], stored.light, 0, stored.keep});
         }
         rows.put(i, row);
     }

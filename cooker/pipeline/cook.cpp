@@ -1,6 +1,7 @@
 #include <pipeline/cook.h>
 
 #include <bake/bake.h>
+#include <bake/sampling.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
@@ -171,7 +172,9 @@ Expected<void> chart(Scene& scene, const Profile& profile, const Quality& qualit
 }
 
 // The scene's light sets are divided by their scales.
-Baked bakeWithCache(const Charted& level, const BakeSettings& settings, Progress& progress, CookCache* cache) {
+Baked bakeWithCache(const Charted& level, BakeSettings settings, const SetScales& scales, Progress& progress,
+                    CookCache* cache) {
+    for (const glm::vec3 scale : scales.of_group) settings.group_brightness.push_back(luminance(scale));
     if (!cache) return bake(*level.rays, level.charts, level.texels, settings, progress);
     const Scene& scene = level.rays->scene();
     const Key settings_key = bakeSettingsKey(settings);
@@ -238,7 +241,6 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
                     fmt::format("there is no quality '{}'; take draft, preview or final", quality_name));
     PackData pack;
     Charted level;
-    Scene as_written = quality->suggest_combinations ? scene : Scene{};
     const SetScales scales = divideByScales(scene);
     {
         Stopwatch watch(stats, "charts");
@@ -293,7 +295,7 @@ namespace {
 
 // Null where the options ask for none, or where only a run without one measures what it is to measure.
 std::optional<CookCache> openCache(const CookOptions& options, CookStats& stats) {
-    if (options.cache.empty() || options.per_set_passes || options.suggest_combinations) return {};
+    if (options.cache.empty() || options.per_set_passes) return {};
     auto store = CacheStore::open(options.cache);
     if (store) return CookCache(std::move(*store), options.pack);
     stats.warnings.push_back("cooked without a cache: " + store.error().message);
@@ -319,6 +321,7 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
     result.pack = std::move(*pack);
     result.stats.warnings = std::move(entry.warnings);
     result.stats.bounces = entry.bounces;
+    result.stats.suggested_combinations = std::move(entry.suggested_combinations);
     return std::move(entry.pack);
 }
 
@@ -339,7 +342,9 @@ Expected<std::vector<std::byte>> findOrMakePack(Scene scene, const Profile& prof
     const Key key = packKey(scene, profile, quality, *cache);
     if (auto entry = cache->findPack(key)) return takePack(std::move(*entry), result);
     auto bytes = makePack(std::move(scene), profile, quality, progress, cache, result);
-    if (bytes) cache->keepPack(key, {*bytes, result.stats.bounces, result.stats.warnings});
+    if (bytes)
+        cache->keepPack(key,
+                        {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations});
     return bytes;
 }
 

@@ -21,8 +21,8 @@ struct CookOptions {
     std::string quality = "preview";
     std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
     uint32_t threads = 0;               // 0: as many as the machine has
-    bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
-    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
+    bool per_set_passes = false;       // one final gather per light group: a baseline to measure the shared one against
+    bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
 };

@@ -18,6 +18,11 @@ std::vector<std::byte> toBytes(const PackEntry& entry) {
     out.put(entry.bounces);
     out.put(static_cast<uint32_t>(entry.warnings.size()));
     for (const std::string& warning : entry.warnings) out.putString(warning);
+    out.put(static_cast<uint32_t>(entry.suggested_combinations.size()));
+    for (const auto& [first, second] : entry.suggested_combinations) {
+        out.putString(first);
+        out.putString(second);
+    }
     out.putArray(std::span<const std::byte>(entry.pack));
     return out.take();
 }
@@ -27,6 +32,11 @@ std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
     PackEntry entry;
     entry.bounces = in.get<uint32_t>();
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.warnings.push_back(in.getString());
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {
+        auto& [first, second] = entry.suggested_combinations.emplace_back();
+        first = in.getString();
+        second = in.getString();
+    }
     entry.pack = in.getArray<std::byte>();
     return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
 }

@@ -23,6 +23,7 @@ struct PackEntry {
     std::vector<std::byte> pack;
     uint32_t bounces = 0;
     std::vector<std::string> warnings;
+    std::vector<std::pair<std::string, std::string>> suggested_combinations;
 };
 
 // The cache as one cook of one pack uses it. Remembers what the last cook of the pack depended on, to say what changed.
