@@ -2,6 +2,7 @@
 function(dimmer_embed_profiles target)
     set(out "${CMAKE_CURRENT_BINARY_DIR}/${target}_profiles")
     file(GLOB files CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/profiles/*.json")
+    list(FILTER files EXCLUDE REGEX "/schema\\.json$")
     set(body "")
     foreach(file ${files})
         set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")

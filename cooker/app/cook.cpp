@@ -21,8 +21,32 @@ struct Arguments {
     std::string write_level;
     std::string report;
     std::string progress = "text";
+    bool no_cache = false, explain_cache = false;
+    uint32_t cache_limit_mb = 4096;
     bool suggest_combinations = false;
 };
+
+// Beside the pack; nowhere where that is a device or a pipe.
+std::filesystem::path defaultCache(const std::filesystem::path& pack) {
+    std::error_code ignored;
+    const auto status = std::filesystem::status(pack, ignored);
+    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) return {};
+    return pack.parent_path() / ".dimmer-cache";
+}
+
+void printCache(const CookStats& stats) {
+    fmt::print("\n{:<26} {}\n", "stage", "from the cache?");
+    for (const CacheLine& line : stats.cache)
+        fmt::print("{:<26} {}\n", line.what, line.reused ? "reused" : "made: " + line.why);
+    if (stats.cache.empty()) fmt::print("no cache was used\n");
+}
+
+nlohmann::ordered_json cacheJson(const CookStats& stats) {
+    auto list = nlohmann::ordered_json::array();
+    for (const CacheLine& line : stats.cache)
+        list.push_back({{"stage", line.what}, {"reused", line.reused}, {"why", line.why}});
+    return list;
+}
 
 std::string share(uint64_t bytes, uint64_t budget) {
     return budget == 0
@@ -73,6 +97,7 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     json["peak_bytes"] = result.stats.peak_bytes;
     json["file_bytes"] = result.file_bytes;
     json["warnings"] = result.stats.warnings;
+    json["cache"] = cacheJson(result.stats);
     if (!result.stats.suggested_combinations.empty()) json["dimmer_combinations"] = suggestions(result.stats);
     return json;
 }
@@ -89,8 +114,6 @@ Expected<void> writeReport(const CookResult& result, const Arguments& a) {
 }
 
 int run(const Arguments& a) {
-    const auto profile = loadProfile(a.options.profile);
-    if (!profile) return reportError(profile.error());
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
@@ -102,7 +125,13 @@ int run(const Arguments& a) {
         progress = std::make_unique<JsonProgress>();
     else
         progress = std::make_unique<TerminalProgress>();
-    auto result = cook(a.options, *progress);
+    CookOptions options = a.options;
+    options.cache_bytes_max = uint64_t{a.cache_limit_mb} << 20;
+    if (a.no_cache)
+        options.cache.clear();
+    else if (options.cache.empty())
+        options.cache = defaultCache(options.pack);
+    auto result = cook(options, *progress);
     if (!result) return reportError(result.error());
     if (!a.write_level.empty())
         if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)
@@ -112,7 +141,8 @@ int run(const Arguments& a) {
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
-    if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
+    if (a.json != "-") printTable(*result, costOf(result->pack), result->profile);
+    if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
@@ -133,6 +163,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
         ->check(CLI::IsMember({"draft", "preview", "final"}))
         ->capture_default_str();
+    c->add_option("--set", a->options.set,
+                  "key=value: a setting of the profile (see profiles/schema.json), before what level and profile say")
+        ->expected(1)
+        ->take_all();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
     c->add_flag(
@@ -152,6 +186,13 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   "write an HTML page there: pages, regions of sets and doors, overlaps, budgets, times, warnings");
     c->add_option("--write-level", a->write_level,
                   "write the level there as .glb, its meshes with the final lightmap UVs in TEXCOORD_1");
+    auto* cache = c->add_option("--cache", a->options.cache,
+                                "folder of what earlier cooks found out; default: .dimmer-cache beside the pack");
+    c->add_flag("--no-cache", a->no_cache, "keep nothing and reuse nothing; the pack is the same")->excludes(cache);
+    c->add_option("--cache-limit", a->cache_limit_mb,
+                  "MiB that the cache may hold; what was used least recently goes first")
+        ->capture_default_str();
+    c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

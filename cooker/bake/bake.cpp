@@ -3,6 +3,7 @@
 #include <bake/denoise.h>
 #include <bake/door_pairs.h>
 #include <bake/final_gather.h>
+#include <bake/group_light.h>
 #include <bake/series.h>
 
 #include <atomic>
@@ -11,7 +12,7 @@ namespace dimmer::cook {
 namespace {
 
 Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                Progress& progress, uint64_t& rays) {
+                                std::span<const uint8_t> groups, Progress& progress, uint64_t& rays) {
     const size_t receivers = gatherer.texels().size();
     progress.stage("final gather", receivers);
     const std::vector<float> floors = noiseFloors(series);
@@ -24,10 +25,12 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
             series.activeTerms(i, terms);
+            if (!groups[always_group]) std::erase(terms, always_group);
             row.clear();
             if (!settings.per_set_passes) traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row);
             for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
                 traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
+            for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));
         }
         all_traced += traced;
@@ -52,29 +55,52 @@ Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sp
     });
 }
 
+// Fills `baked` with the light of the groups whose turn it is. Returns the bounces per group.
+std::vector<uint32_t> bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
+                                 std::span<const uint8_t> groups, Progress& progress, Baked& baked) {
+    Series series = expandSeries(gatherer, settings, progress, groups);
+    baked.rays = series.rays;
+    baked.door_flux = doorFlux(gatherer, series, settings, groups, progress);
+    baked.light = gatherAll(gatherer, series, settings, groups, progress, baked.rays);
+    baked.reports = std::move(series.reports);
+    const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
+    std::vector<uint32_t> bounces = std::move(series.bounces);
+    series = {};
+    if (settings.denoise) baked.light = denoise(gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
+    baked.light = withDirect(baked.light, direct);
+    for (size_t i = 0; i < baked.light.rows(); ++i)
+        for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;
+    baked.bounces = std::ranges::max(bounces);
+    return bounces;
+}
+
 }  // namespace
 
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
-           Progress& progress) {
-    const EmitterSampler emitters(rays, meshGroups(rays.scene()));
+           Progress& progress, GroupStore* store) {
     const DoorPaths paths(rays.scene());
-    const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
-    Series series = expandSeries(gatherer, settings, progress);
-    Baked out;
-    out.rays = series.rays;
-    out.dependent_doors = dependentDoors(gatherer, series, settings, progress);
-    out.light = gatherAll(gatherer, series, settings, progress, out.rays);
-    out.terms = paths.terms();
-    out.reports = std::move(series.reports);
-    out.bounces = series.bounces;
-    out.warnings = std::move(series.warnings);
-    const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
-    series = {};
-    if (settings.denoise) out.light = denoise(unwrap, texels, std::move(out.light), progress);
-    out.light = withDirect(out.light, direct);
-    for (size_t i = 0; i < texels.size(); ++i)
-        for (const ReceiverLight& l : out.light.row(i)) ++out.reports[l.term].receivers;
-    return out;
+    std::vector<std::optional<GroupLight>> found(paths.groupCount());
+    std::vector<uint8_t> missing(paths.groupCount(), 1);
+    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
+        if (found[g] = store->find(g); found[g]) missing[g] = 0;
+    Baked baked;
+    baked.terms = paths.terms();
+    baked.reports.resize(paths.termCount());
+    baked.door_flux.resize(paths.groupCount());
+    if (std::ranges::count(missing, 1) > 0) {
+        const EmitterSampler emitters(rays, meshGroups(rays.scene()));
+        const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
+        const std::vector<uint32_t> bounces = bakeGroups(gatherer, settings, missing, progress, baked);
+        for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
+            if (missing[g]) store->keep(g, lightOfGroup(baked, g, bounces[g]));
+    } else {
+        baked.light = Sparse<ReceiverLight>::Builder(texels.size()).finish();
+    }
+    addGroups(found, baked);
+    baked.dependent_doors = dependentDoors(baked.door_flux, settings);
+    if (baked.bounces == settings.bounces_max)
+        baked.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
+    return baked;
 }
 
 }  // namespace dimmer::cook

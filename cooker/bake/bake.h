@@ -5,6 +5,7 @@
 #include <bake/progress.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,14 +18,21 @@ struct BakeSettings {
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
     bool denoise = false;          // filter what noise is left, in lightmap space
     uint32_t bounces_max = 64;
-    float tail_max = 0.002f;  // stop when what is still to come is below this share of the sum
-    float threshold = 0.01f;  // activity, as a share of a term's mean; see TermReport
+    float tail_max = 0.002f;                   // stop when what is still to come is below this share of the sum
+    float threshold = 0.01f;                   // activity, as a share of a term's mean; see TermReport
+    std::vector<float> group_thresholds = {};  // the same for each light group; empty: one for all
     uint32_t seed = 1;
     // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
     bool light_grid = true;
     // The final gather once per term, as bakers do that know nothing of sharing rays: the same result, for
     // measuring against.
     bool per_set_passes = false;
+
+    // Per light group, how bright it is in the level, where the scene has it at another scale: by this the groups count
+    // together when pairs of doors are judged. Empty: as the scene has them.
+    std::vector<float> group_brightness = {};
+
+    float thresholdOf(uint32_t group) const { return group_thresholds.empty() ? threshold : group_thresholds[group]; }
 };
 
 // What is stored for one (receiver, term).
@@ -32,10 +40,12 @@ struct ReceiverLight {
     uint32_t term = 0;
     Gathered light;
     float variance = 0;  // of the luminance of the irradiance, lux^2; Monte Carlo noise alone
+    float keep = 0;      // the largest activity threshold at which it is stored; infinite for always-on light
 };
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
-// the receivers that see one of the doors, by what is stored.
+// the receivers that see one of the doors, by what is stored; the threshold of those is at least their group's own, and
+// that share of the group's light around the door.
 struct TermReport {
     uint64_t receivers = 0;  // active ones
     uint64_t measured_over = 0;
@@ -53,20 +63,50 @@ struct DoorPair {
     float loss = 0;
 };
 
+// Luminous flux of one light group over paths that need doors, lm: by it pairs of doors are judged.
+struct DoorFlux {
+    struct Pair {
+        uint32_t first = 0, second = 0;
+        double flux = 0;  // needs both
+    };
+    std::vector<double> alone;  // per door, needs it and no other
+    std::vector<Pair> pairs;    // that some surface sees together and no combination covers
+};
+
 struct Baked {
-    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
-    std::vector<Term> terms;          // as DoorPaths lists them
-    std::vector<TermReport> reports;  // per term
-    uint32_t bounces = 0;
-    uint64_t rays = 0;
+    Sparse<ReceiverLight> light;            // per receiver: always-on light first, then the active terms
+    std::vector<Term> terms;                // as DoorPaths lists them
+    std::vector<TermReport> reports;        // per term
+    uint32_t bounces = 0;                   // of the light group that took most
+    uint64_t rays = 0;                      // traced, not remembered
+    std::vector<DoorFlux> door_flux;        // per light group
     std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
 };
 
+// All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
+// alone, so that a store can keep it.
+struct GroupLight {
+    Sparse<ReceiverLight> light;      // per receiver; `term` counts the group's own terms, variances are 0
+    std::vector<TermReport> reports;  // per term of the group
+    DoorFlux door_flux;
+    uint32_t bounces = 0;
+};
+
+// Where finished groups are kept from one bake to the next.
+class GroupStore {
+   public:
+    virtual ~GroupStore() = default;
+    // Groups that are found are not baked again.
+    virtual std::optional<GroupLight> find(uint32_t group) = 0;
+    virtual void keep(uint32_t group, const GroupLight& light) = 0;
+};
+
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
 // receivers traced once and followed bounce after bounce, then one gather of many rays that is kept.
-// Deterministic for any number of threads. Memory: 4 bytes * series_rays per texel, plus what is active.
+// Deterministic for any number of threads, and whatever a store already has. Memory: 4 bytes * series_rays per texel,
+// plus what is active.
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
-           Progress& progress);
+           Progress& progress, GroupStore* store = nullptr);
 
 }  // namespace dimmer::cook

@@ -1,5 +1,6 @@
 #include <bake/door_guides.h>
 
+#include <bake/door_paths.h>
 #include <bake/punctual.h>
 #include <bake/sampling.h>
 
@@ -13,7 +14,7 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t door_points = 256;
-// Lamps that bring less than this share of the light at a point of the door light no patch worth a box.
+// Lamps that bring less than this share of their group's light at a point of the door light no patch worth a box.
 constexpr float share_min = 0.01f;
 constexpr float far_away_m = 1e30f;
 // Boxes of patches have some thickness, so that every point sees them from outside.
@@ -49,8 +50,9 @@ GuideBox boundsOf(std::span<const Photon> photons) {
     return box;
 }
 
-// Shadow photons: where lamps' light that passes a point of the door's box lands, as if no door stood anywhere.
-std::vector<Photon> shadowPhotons(const RayScene& rays, const GuideBox& door, uint32_t seed) {
+// Shadow photons: where light of these lamps that passes a point of the door's box lands, as if no door stood anywhere.
+std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t> lamps, const GuideBox& door,
+                                  uint32_t seed) {
     std::vector<Photon> photons;
     std::vector<Illumination> lit;
     for (uint32_t i = 0; i < door_points; ++i) {
@@ -59,9 +61,9 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, const GuideBox& door, ui
         const glm::vec3 point = glm::mix(door.low, door.high, within);
         float sum = 0;
         lit.clear();
-        for (const PunctualLight& light : rays.scene().lights) {
-            if (light.bake != BakeMode::None) lit.push_back(illuminate(light, point));
-            if (light.bake != BakeMode::None) sum += luminance(lit.back().irradiance_lux);
+        for (const uint32_t lamp : lamps) {
+            lit.push_back(illuminate(rays.scene().lights[lamp], point));
+            sum += luminance(lit.back().irradiance_lux);
         }
         for (const Illumination& l : lit) {
             const float flux = luminance(l.irradiance_lux);
@@ -109,19 +111,38 @@ std::vector<GuideBox> cluster(std::vector<Photon> photons) {
 
 }  // namespace
 
-DoorGuides::DoorGuides(const RayScene& rays) : boxes_(rays.scene().doors.size()) {
-    std::vector<GuideBox> doors(boxes_.size(), empty());
+DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint32_t>(rays.scene().light_sets.size())) {
+    const Scene& scene = rays.scene();
+    const auto door_count = static_cast<uint32_t>(scene.doors.size());
+    std::vector<GuideBox> doors(door_count, empty());
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const uint32_t condition = rays.triangles()[t].condition;
         if (condition == no_condition || (condition & 1)) continue;  // where the leaf stands closed, the opening is
         for (int i = 0; i < 3; ++i) include(doors[condition / 2], rays.corner(t, i));
     }
-    tbb::parallel_for(size_t{0}, doors.size(), [&](size_t d) {
-        if (!(doors[d].low.x <= doors[d].high.x)) return;
-        boxes_[d] = {doors[d]};
-        const auto patches = cluster(shadowPhotons(rays, doors[d], static_cast<uint32_t>(d)));
-        boxes_[d].insert(boxes_[d].end(), patches.begin(), patches.end());
+    std::vector<std::vector<uint32_t>> lamps(group_count_);
+    for (uint32_t l = 0; l < scene.lights.size(); ++l)
+        if (scene.lights[l].bake != BakeMode::None) lamps[groupOf(scene.lights[l].light_set)].push_back(l);
+    std::vector<std::vector<GuideBox>> patches(size_t{door_count} * group_count_);
+    tbb::parallel_for(size_t{0}, patches.size(), [&](size_t i) {
+        const GuideBox& door = doors[i / group_count_];
+        if (door.low.x <= door.high.x)
+            patches[i] =
+                cluster(shadowPhotons(rays, lamps[i % group_count_], door, static_cast<uint32_t>(i / group_count_)));
     });
+    for (uint32_t d = 0; d < door_count; ++d) {
+        boxes_.emplace_back();
+        if (doors[d].low.x <= doors[d].high.x) boxes_.back() = {doors[d]};
+        identity_.push_back(d);
+    }
+    for (size_t i = 0; i < patches.size(); ++i) {
+        const auto door = static_cast<uint32_t>(i / group_count_), group = static_cast<uint32_t>(i % group_count_);
+        guide_of_.push_back(patches[i].empty() ? door : static_cast<uint32_t>(boxes_.size()));
+        if (patches[i].empty()) continue;
+        boxes_.push_back(boxes_[door]);
+        boxes_.back().insert(boxes_.back().end(), patches[i].begin(), patches[i].end());
+        identity_.push_back(hash(hash(door, 1), groupIdentity(scene, group)));
+    }
 }
 
 Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal) {

@@ -20,15 +20,25 @@ struct GuideBox {
 
 inline constexpr uint32_t patch_boxes_max = 12;
 
-// Immutable after construction.
+inline constexpr uint32_t no_guide = UINT32_MAX;
+
+// A guide for every door, and another one for every light group whose own lamps shine through it: what one group's rays
+// look at depends on no other's lamps. Immutable after construction.
 class DoorGuides {
    public:
     explicit DoorGuides(const RayScene& rays);
+    // For light of `group` over paths about `door` alone.
+    uint32_t guideOf(uint32_t door, uint32_t group) const { return guide_of_[door * group_count_ + group]; }
     // The door's own box first, then at most patch_boxes_max of patches.
-    std::span<const GuideBox> boxes(uint32_t door) const { return boxes_[door]; }
+    std::span<const GuideBox> boxes(uint32_t guide) const { return boxes_[guide]; }
+    // For seeds.
+    uint32_t identity(uint32_t guide) const { return identity_[guide]; }
 
    private:
-    std::vector<std::vector<GuideBox>> boxes_;
+    uint32_t group_count_ = 1;
+    std::vector<uint32_t> guide_of_;            // door, group
+    std::vector<std::vector<GuideBox>> boxes_;  // per guide; those of doors alone come first
+    std::vector<uint32_t> identity_;            // per guide
 };
 
 // Directions from one point towards a door's boxes: a mixture over boxes, over the sides of a box that face the point,

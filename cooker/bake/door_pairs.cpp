@@ -52,28 +52,49 @@ std::vector<uint32_t> doorsOf(const Term& term) {
 
 }  // namespace
 
-std::vector<DoorPair> dependentDoors(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                     Progress& progress) {
+std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
+                               std::span<const uint8_t> groups, Progress& progress) {
     Scene named = gatherer.rays().scene();
     const auto pairs = seenTogether(named, series.doors_seen);
-    if (pairs.empty()) return {};
+    std::vector<DoorFlux> flux(groups.size());
+    if (pairs.empty()) return flux;
     for (const Pair& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
     const DoorPaths paths(named);
     const Gatherer keeping_pairs(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), gatherer.emitters(), paths);
-    const Series measured = expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress);
+    const Series measured = expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups);
 
-    std::vector<double> alone(named.doors.size());
-    std::map<Pair, double> together;
+    for (DoorFlux& f : flux) {
+        f.alone.resize(named.doors.size());
+        for (const Pair& pair : pairs) f.pairs.push_back({pair.first, pair.second, 0});
+    }
     for (uint32_t t = 0; t < paths.termCount(); ++t) {
         const auto doors = doorsOf(paths.terms()[t]);
-        if (doors.size() == 1) alone[doors[0]] += measured.reports[t].energy;
-        if (doors.size() == 2) together[{doors[0], doors[1]}] += measured.reports[t].energy;
+        DoorFlux& f = flux[paths.terms()[t].group];
+        if (doors.size() == 1) f.alone[doors[0]] += measured.reports[t].energy;
+        if (doors.size() != 2) continue;
+        const auto pair = pairs.find({doors[0], doors[1]});
+        if (pair != pairs.end())
+            f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += measured.reports[t].energy;
     }
+    return flux;
+}
+
+std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeSettings& settings) {
+    const auto sum = [&](auto&& of_group) {
+        double all = 0;
+        for (size_t g = 0; g < flux.size(); ++g)
+            all += (settings.group_brightness.empty() ? 1.0 : static_cast<double>(settings.group_brightness[g])) *
+                   of_group(flux[g]);
+        return all;
+    };
     std::vector<DoorPair> found;
-    for (const Pair& pair : pairs) {
-        const double less = std::min(alone[pair.first], alone[pair.second]);
-        const auto loss = static_cast<float>(less > 0 ? together[pair] / less : 0);
-        if (loss > settings.threshold) found.push_back({pair.first, pair.second, loss});
+    for (size_t p = 0; !flux.empty() && p < flux[0].pairs.size(); ++p) {
+        const uint32_t first = flux[0].pairs[p].first, second = flux[0].pairs[p].second;
+        const auto alone = [&](uint32_t door) { return sum([&](const DoorFlux& f) { return f.alone[door]; }); };
+        const double less = std::min(alone(first), alone(second));
+        const double together = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
+        const auto loss = static_cast<float>(less > 0 ? together / less : 0);
+        if (loss > settings.threshold) found.push_back({first, second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);
     return found;

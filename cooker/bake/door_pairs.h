@@ -7,10 +7,12 @@
 
 namespace dimmer::cook {
 
-// The pairs that some surface sees together, that no combination covers and whose loss is above the threshold, the
-// largest loss first. `series` is the bake's own. Measured by another of few rays with those pairs kept; where no pair
-// is seen, it costs nothing.
-std::vector<DoorPair> dependentDoors(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                     Progress& progress);
+// Per light group; of groups that are not asked for, nothing. `series` is the bake's own. Measured by another of few
+// rays that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing.
+std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
+                               std::span<const uint8_t> groups, Progress& progress);
+
+// The pairs whose loss, over all groups, is above the threshold, the largest first.
+std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeSettings& settings);
 
 }  // namespace dimmer::cook

@@ -1,5 +1,7 @@
 #include <bake/door_paths.h>
 
+#include <bake/sampling.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -58,6 +60,13 @@ Term makeTerm(uint32_t group, const Conditions& conditions) {
 }
 
 }  // namespace
+
+uint32_t groupIdentity(const Scene& scene, uint32_t group) {
+    if (group == always_group) return 0;
+    uint32_t id = 1;
+    for (const char c : scene.light_sets[group - 1].name) id = hash(id, static_cast<unsigned char>(c));
+    return id;
+}
 
 DoorPaths::DoorPaths(const Scene& scene)
     : condition_count_(2 * static_cast<uint32_t>(scene.doors.size())),

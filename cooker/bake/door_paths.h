@@ -27,6 +27,9 @@ inline uint32_t groupOf(std::optional<uint32_t> light_set) {
     return light_set ? 1 + *light_set : always_group;
 }
 
+// A number of the group's own for seeds: from its set's name, so that other sets, added or removed, change no noise.
+uint32_t groupIdentity(const Scene& scene, uint32_t group);
+
 // One light group over paths that need these doors to be open or closed (indices into Scene::doors, ascending).
 struct Term {
     uint32_t group = always_group;

@@ -47,6 +47,7 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     std::ranges::stable_sort(emitters_, {}, &Emitter::group);
     for (uint32_t i = 0; i < emitters_.size(); ++i) emitter_of_[emitters_[i].triangle] = i;
     if (emitters_.empty()) return;
+    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
 
     const glm::vec3 extent = rays.boundsMax() - rays.boundsMin();
     cell_m_ = std::max(cell_min_m, std::max(extent.x, std::max(extent.y, extent.z)) / cells_per_axis_max);
@@ -103,8 +104,8 @@ void EmitterSampler::fillCell(Cell& cell, glm::vec3 centre, float radius_m) cons
             cumulative += cell.choices[i].probability;
             cell.choices[i].cumulative = cumulative;
         }
-        cell.ranges.push_back(
-            {group, static_cast<uint32_t>(first), static_cast<uint32_t>(cell.choices.size() - first)});
+        cell.ranges.push_back({group, identities_[group], static_cast<uint32_t>(first),
+                               static_cast<uint32_t>(cell.choices.size() - first)});
     }
 }
 

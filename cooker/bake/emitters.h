@@ -41,6 +41,7 @@ class EmitterSampler {
     // The groups worth sampling from `cell`.
     struct GroupRange {
         uint32_t group;
+        uint32_t identity;      // of the group, for seeds
         uint32_t first, count;  // into the choices
     };
     uint32_t cellAt(glm::vec3 point) const;
@@ -70,6 +71,7 @@ class EmitterSampler {
 
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;
+    std::vector<uint32_t> identities_;  // per light group
     glm::vec3 origin_{0};
     float cell_m_ = 1;
     glm::uvec3 size_{1};

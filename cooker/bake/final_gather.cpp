@@ -46,9 +46,9 @@ float FinalGather::State::varianceOfMean() const {
 void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options) {
     aims_.clear();
     for (uint32_t t : terms) {
-        const uint32_t door = options.aim_at_doors ? gatherer_.paths().onlyDoor(t) : no_door;
-        if (door != no_door && std::ranges::find(aims_, door, &DoorAim::door) == aims_.end())
-            aims_.push_back(gatherer_.aimAt(from, door));
+        const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
+        if (guide != no_guide && std::ranges::find(aims_, guide, &DoorAim::guide) == aims_.end())
+            aims_.push_back(gatherer_.aimAt(from, guide));
     }
 }
 

@@ -43,8 +43,8 @@ struct Gatherer::Ray {
     const DoorAim* aim;  // whose ray this is; null: a cosine ray
     uint32_t i, point;   // in this gather; of the receiver
     glm::vec3 origin, world, tangent;
-    // By door of the first aims, once a term has asked: many terms are about the same door.
-    mutable std::array<float, 8> share_of_aim{};
+    // By guide of the first aims, once a term has asked: many terms share a guide.
+    mutable std::array<float, 16> share_of_aim{};
 };
 
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
@@ -66,18 +66,23 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
     if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
 }
 
-DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t door) const {
-    DoorAim aim{door, {}};
+uint32_t Gatherer::guideOf(uint32_t term) const {
+    const uint32_t door = paths_.onlyDoor(term);
+    return door == no_door ? no_guide : guides_.guideOf(door, paths_.terms()[term].group);
+}
+
+DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
+    DoorAim aim{guide, {}};
     for (const SamplePoint& p : from.points)
-        aim.from_point.emplace_back(guides_.boxes(door), p.position_m, unwrap_.frames[p.face].normal);
+        aim.from_point.emplace_back(guides_.boxes(guide), p.position_m, unwrap_.frames[p.face].normal);
     return aim;
 }
 
 void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                            TermAccumulator<Gathered>& sum, std::span<const DoorAim> aims, size_t a) const {
     const DoorAim& aim = aims[a];
-    // Seeded by the door alone: what else is aimed at does not change its noise.
-    const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), aim.door);
+    // Seeded by the guide alone: what else is aimed at does not change its noise.
+    const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), guides_.identity(aim.guide));
     for (uint32_t i = 0; i < aimed_rays; ++i) {
         // The rays of all rounds are one sequence.
         const uint32_t index = options.first_ray * aimed_rays / options.rays + i;
@@ -121,10 +126,10 @@ void Gatherer::follow(const Ray& ray, uint32_t seed) const {
 // have found it there.
 float Gatherer::shareOf(const Ray& ray, uint32_t term) const {
     const float alone = pi / static_cast<float>(ray.options.rays);
-    const uint32_t door = ray.aims.empty() ? no_door : paths_.onlyDoor(term);
-    if (ray.aim && ray.aim->door != door) return 0;
-    if (door == no_door) return alone;
-    const auto aim = std::ranges::find(ray.aims, door, &DoorAim::door);
+    const uint32_t guide = ray.aims.empty() ? no_guide : guide_of_term_[term];
+    if (ray.aim && ray.aim->guide != guide) return 0;
+    if (guide == no_guide) return alone;
+    const auto aim = std::ranges::find(ray.aims, guide, &DoorAim::guide);
     if (aim == ray.aims.end() || aim->from_point[ray.point].empty()) return alone;
     const auto index = static_cast<size_t>(aim - ray.aims.begin());
     if (index < ray.share_of_aim.size() && ray.share_of_aim[index] > 0) return ray.share_of_aim[index];
@@ -244,7 +249,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
-            const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.group);
+            const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.identity);
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(frame, s.direction);

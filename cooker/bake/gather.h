@@ -46,9 +46,9 @@ struct GatherOptions {
     std::span<const uint32_t> wanted_in_group;
 };
 
-// Rays towards one door and what it lights, for the terms with that door alone.
+// Rays towards one door and what a light group lights through it, for the terms of that guide.
 struct DoorAim {
-    uint32_t door = 0;
+    uint32_t guide = 0;             // of DoorGuides
     std::vector<Guide> from_point;  // one per point of the receiver
 };
 
@@ -84,16 +84,20 @@ class Gatherer {
           emitters_(emitters),
           paths_(paths),
           sky_(rays.scene()),
-          guides_(rays) {}
+          guides_(rays) {
+        for (uint32_t t = 0; t < paths.termCount(); ++t) guide_of_term_.push_back(guideOf(t));
+    }
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
-    // `aims`: doors that get `aimed_rays` each besides. Unbiased: emitters are found by area and by hit, an image sky
+    // `aims`: guides that get `aimed_rays` each besides. Unbiased: emitters are found by area and by hit, an image sky
     // by its own density and by miss, what surfaces and a constant sky send through an aimed door by its rays and all
     // others, weighted by the balance heuristic (Veach 1995).
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                 TermAccumulator<Gathered>& sum, GatherLinks* links, std::span<const DoorAim> aims = {}) const;
-    DoorAim aimAt(const GatherFrom& from, uint32_t door) const;
+    DoorAim aimAt(const GatherFrom& from, uint32_t guide) const;
+    // Of the term's one door; no_guide for the others.
+    uint32_t guideOf(uint32_t term) const;
 
     GatherFrom at(size_t receiver) const {
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
@@ -132,6 +136,7 @@ class Gatherer {
     const DoorPaths& paths_;
     SkySampler sky_;
     DoorGuides guides_;
+    std::vector<uint32_t> guide_of_term_;
 };
 
 }  // namespace dimmer::cook

@@ -1,5 +1,6 @@
 #include <bake/light_grid.h>
 
+#include <bake/door_paths.h>
 #include <bake/sampling.h>
 
 #include <tbb/parallel_for.h>
@@ -38,7 +39,7 @@ glm::vec3 capDirection(uint32_t i, uint32_t n, float cos_least, glm::vec3 axis) 
 
 }  // namespace
 
-LightGrid::LightGrid(const RayScene& rays, bool enabled) {
+LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t> groups) {
     const auto isFarOutside = [&](glm::vec3 p) {
         return glm::distance(p, glm::clamp(p, rays.boundsMin(), rays.boundsMax())) > margin_m;
     };
@@ -47,7 +48,8 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled) {
     for (uint32_t l = 0; l < lights.size(); ++l) {
         const PunctualLight& light = lights[l];
         identity_.push_back(identityOf(light));
-        if (light.bake == BakeMode::None) continue;
+        const bool asked = groups.empty() || groups[groupOf(light.light_set)];
+        if (light.bake == BakeMode::None || !asked) continue;
         const bool unlisted = !enabled || light.type == LightType::Directional || light.bake == BakeMode::Full ||
                               isFarOutside(light.position_m);
         (unlisted ? everywhere_ : sought).push_back(l);

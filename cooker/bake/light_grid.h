@@ -20,8 +20,9 @@ inline constexpr uint32_t light_probe_rays = 4096;
 // far outside of the level, whose rays would miss it. What is said of a light depends on no other light.
 class LightGrid {
    public:
-    // Disabled, every light reaches everything.
-    explicit LightGrid(const RayScene& rays, bool enabled = true);
+    // Disabled, every light reaches everything. `groups`: per light group, whether its lights are asked for; empty:
+    // all.
+    explicit LightGrid(const RayScene& rays, bool enabled = true, std::span<const uint8_t> groups = {});
 
     // visit(light) for those whose light may be found at `point`; always in the same order.
     void forEach(glm::vec3 point, auto&& visit) const {

@@ -12,48 +12,59 @@ namespace dimmer::cook {
 namespace {
 
 // Bounced light of a set below this share of its activity threshold does not bounce on: with the usual threshold of
-// 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss.
+// 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss. Larger thresholds
+// let no more go: the series, and so what is cached of it, is the same for all of them.
 constexpr float lingering_share = 0.01f;
+constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
-// A term with doors need not be stored where it is this much fainter than what its light group's own threshold asks
-// for.
-constexpr float door_threshold_share = 0.3f;
 
-// How much light there is around each door: over the receivers that see it, all terms together.
+// How much light of each group there is around each door: over the receivers that see it, all of the group's terms
+// together.
 class Surroundings {
    public:
     Surroundings(const DoorPaths& paths, const Sparse<uint32_t>& doors_seen)
-        : doors_seen_(doors_seen), sums_(paths.doorCount()), counts_(paths.doorCount()) {
+        : doors_seen_(doors_seen),
+          groups_(paths.groupCount()),
+          sums_(size_t{paths.doorCount()} * groups_),
+          counts_(paths.doorCount()) {
         for (size_t i = 0; i < doors_seen.rows(); ++i)
             for (const uint32_t door : doors_seen.row(i)) ++counts_[door];
     }
-    void add(size_t receiver, float lux) {
-        for (const uint32_t door : doors_seen_.row(receiver)) sums_[door] += static_cast<double>(lux);
+    void add(size_t receiver, uint32_t group, float lux) {
+        for (const uint32_t door : doors_seen_.row(receiver)) sums_[door * groups_ + group] += static_cast<double>(lux);
     }
-    // Around the darkest of a term's doors.
+    // Around that of a term's doors where its group is faintest.
     float mean(const Term& term) const {
         double least = std::numeric_limits<double>::infinity();
         for (const auto* doors : {&term.doors_open, &term.doors_closed})
-            for (const uint32_t door : *doors) least = std::min(least, sums_[door] / std::max(counts_[door], 1.0));
+            for (const uint32_t door : *doors)
+                least = std::min(least, sums_[door * groups_ + term.group] / std::max(counts_[door], 1.0));
         return static_cast<float>(least);
     }
 
    private:
     const Sparse<uint32_t>& doors_seen_;
-    std::vector<double> sums_, counts_;
+    size_t groups_;
+    std::vector<double> sums_, counts_;  // door, group; door
 };
 
 class Expansion {
    public:
-    Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress)
+    Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+              std::span<const uint8_t> groups)
         : gatherer_(gatherer),
           texels_(gatherer.texels()),
           settings_(settings),
           progress_(progress),
-          grid_(gatherer.rays(), settings.light_grid),
+          grid_(gatherer.rays(), settings.light_grid, groups),
           paths_(gatherer.paths()),
-          terms_(paths_.termCount()) {}
+          terms_(paths_.termCount()),
+          running_(groups.begin(), groups.end()) {
+        if (running_.empty()) running_.assign(paths_.groupCount(), 1);
+        followed_in_group_.resize(paths_.groupCount());
+        for (const Term& term : paths_.terms()) followed_in_group_[term.group] += running_[term.group];
+    }
 
     Series run() {
         directPass();
@@ -86,12 +97,14 @@ class Expansion {
         options.rays = settings_.series_rays;
         options.emitter_samples = settings_.emitter_samples;
         options.seed = settings_.seed;
+        options.wanted_in_group = followed_in_group_;
         SparseLight::Builder direct(texels_.size()), left_to_renderer(texels_.size());
         Sparse<ReceiverLight>::Builder stored(texels_.size());
         Sparse<GatherLinks::ThroughDoors>::Builder door_links(texels_.size());
         Sparse<uint32_t>::Builder doors_seen(texels_.size());
         forEachBlock(texels_.size(), [&](size_t begin, size_t end) {
             TermAccumulator<Gathered> sum(terms_), full(terms_);
+            for (uint32_t t = 0; t < terms_; ++t) sum.setWanted(t, runs(t));
             std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
             GatherLinks links;
@@ -128,8 +141,10 @@ class Expansion {
         out_.stored_direct = stored.finish();
     }
 
-    // What leaves each receiver: rho / pi * (direct + bounced so far).
-    SparseLight outgoing(const SparseLight& bounced) const {
+    bool runs(uint32_t term) const { return running_[paths_.terms()[term].group] != 0; }
+
+    // What leaves each receiver: rho / pi * (direct + bounced so far), of the groups that still run or of all.
+    SparseLight outgoing(const SparseLight& bounced, bool all) const {
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
@@ -137,17 +152,18 @@ class Expansion {
                 const glm::vec3 reflect = texels_.reflectance[i] / pi;
                 const uint32_t own = gatherer_.conditionOf(i);
                 for (const auto* part : {&out_.direct, &bounced})
-                    for (const TermLight& l : part->row(i))
-                        if (const uint32_t term = paths_.leaving(l.term, own); term != no_term)
-                            sum[term] += reflect * l.value;
+                    for (const TermLight& l : part->row(i)) {
+                        const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
+                        if (term != no_term) sum[term] += reflect * l.value;
+                    }
                 takeRow(sum, {}, row);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
 
-    // One more bounce along the links.
-    SparseLight follow(const SparseLight& radiance) const {
+    // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
+    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
         return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
@@ -167,59 +183,70 @@ class Expansion {
                         if (const uint32_t term = paths_.moved(l.term, link.path, own); term != no_term)
                             sum[term] += lux_per_radiance * l.value;
                 takeRow(sum, least_, row);
+                for (const TermLight& l : bounced.row(i))
+                    if (!runs(l.term)) row.push_back(l);
+                std::ranges::sort(row, {}, &TermLight::term);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
 
-    double flux(const SparseLight& light) const {
-        double sum = 0;
+    std::vector<double> fluxOfGroups(const SparseLight& light) const {
+        std::vector<double> sums(paths_.groupCount());
         for (size_t i = 0; i < light.rows(); ++i)
-            for (const TermLight& l : light.row(i)) sum += static_cast<double>(texels_.area_m2[i] * luminance(l.value));
-        return sum;
+            for (const TermLight& l : light.row(i))
+                sums[paths_.terms()[l.term].group] += static_cast<double>(texels_.area_m2[i] * luminance(l.value));
+        return sums;
     }
 
-    // Running sum: each round follows the whole light once, so round n holds bounces 1 to n.
+    // Running sum: each round follows the whole light once, so round n holds bounces 1 to n. Each group ends when what
+    // is still to come of its own light is little.
     void bounce() {
         progress_.stage("bounces", settings_.bounces_max);
         out_.bounced = SparseLight::build(texels_.size(), [](size_t begin, size_t end, auto emit) {
             for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
         });
-        double sum = 0, last = 0;
-        for (out_.bounces = 0; out_.bounces < settings_.bounces_max; ++out_.bounces) {
-            out_.bounced = follow(outgoing(out_.bounced));
-            decideLeast();
+        out_.bounces.assign(paths_.groupCount(), 0);
+        std::vector<double> sums(paths_.groupCount()), last(paths_.groupCount());
+        for (uint32_t n = 0; n < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
+            out_.bounced = follow(outgoing(out_.bounced, false), out_.bounced);
+            decideLeast(n);
             progress_.advance(1);
-            const double now = flux(out_.bounced), step = now - sum;
-            const double q = last > 0 ? step / last : 1;
-            sum = now;
-            last = step;
-            if (!(step > 0) || (q < 1 && step * q / (1 - q) < settings_.tail_max * sum)) break;
+            const std::vector<double> now = fluxOfGroups(out_.bounced);
+            for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
+                if (!running_[g]) continue;
+                const double step = now[g] - sums[g], q = last[g] > 0 ? step / last[g] : 1;
+                sums[g] = now[g];
+                last[g] = step;
+                if (!(step > 0) || (q < 1 && step * q / (1 - q) < settings_.tail_max * sums[g]))
+                    running_[g] = 0;
+                else
+                    ++out_.bounces[g];
+            }
         }
-        if (out_.bounces == settings_.bounces_max)
-            out_.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
         links_ = {};
         door_links_ = {};
-        out_.radiance = outgoing(out_.bounced);
+        out_.radiance = outgoing(out_.bounced, true);
     }
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every
     // set would linger everywhere at a millionth of a lux. Light through several doors takes several bounces to appear.
-    void decideLeast() {
+    void decideLeast(uint32_t round) {
         const bool first = least_.empty();
-        if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(out_.bounces + 1))) return;
-        const std::vector<TermReport> reports = thresholds();
+        if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(round + 1))) return;
+        const std::vector<TermReport> reports = thresholds(lingering_threshold_max);
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
             least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
     }
 
-    std::vector<TermReport> thresholds() const {
+    // `most`: no threshold is taken to be larger.
+    std::vector<TermReport> thresholds(float most) const {
         std::vector<TermReport> reports(terms_);
         std::vector<double> sums(terms_);
         Surroundings around(paths_, doors_seen_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
-            around.add(i, stored);
+            around.add(i, paths_.terms()[t].group, stored);
             const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
             if (!counts) return;
             ++reports[t].measured_over;
@@ -230,10 +257,11 @@ class Expansion {
             if (report.measured_over == 0) continue;
             report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
             if (t == always_group) continue;
-            report.threshold_lux = settings_.threshold * report.mean_lux;
+            const float threshold = std::min(settings_.thresholdOf(paths_.terms()[t].group), most);
+            report.threshold_lux = threshold * report.mean_lux;
             if (t < paths_.groupCount()) continue;
             const float near = std::max(reports[paths_.terms()[t].group].mean_lux, around.mean(paths_.terms()[t]));
-            report.threshold_lux = std::max(report.threshold_lux, door_threshold_share * settings_.threshold * near);
+            report.threshold_lux = std::max(report.threshold_lux, threshold * near);
         }
         return reports;
     }
@@ -247,7 +275,11 @@ class Expansion {
     }
 
     void decideActivity() {
-        out_.reports = thresholds();
+        out_.reports = thresholds(1);
+        for (uint32_t t = 0; t < terms_; ++t) {
+            const float share = settings_.thresholdOf(paths_.terms()[t].group);
+            out_.threshold_base.push_back(share > 0 ? out_.reports[t].threshold_lux / share : 0.0f);
+        }
         std::vector<double> dropped(terms_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
             const double energy = static_cast<double>(texels_.area_m2[i] * stored);
@@ -290,7 +322,9 @@ class Expansion {
     LightGrid grid_;
     const DoorPaths& paths_;
     uint32_t terms_;
-    std::vector<uint32_t> links_;  // series_rays per receiver
+    std::vector<uint8_t> running_;             // per light group: its light is still followed
+    std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
+    std::vector<uint32_t> links_;              // series_rays per receiver
     Sparse<GatherLinks::ThroughDoors> door_links_;
     Sparse<uint32_t> doors_seen_;
     std::vector<float> least_;  // lux per term, empty before the first bounce
@@ -306,6 +340,15 @@ bool Series::active(uint32_t term, float direct_lux, float bounced_lux) const {
            (bounced_lux > 0 && bounced_lux >= threshold);
 }
 
+float Series::keepUpTo(size_t receiver, uint32_t term) const {
+    float brightest = 0;
+    for (const auto* part : {&direct, &bounced})
+        for (const TermLight& l : part->row(receiver))
+            if (l.term == term) brightest = std::max(brightest, luminance(l.value));
+    const float base = term == always_group ? 0 : threshold_base[term];
+    return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
+}
+
 void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
     terms.assign(1, always_group);
     for (const TermLight& l : direct.row(receiver))
@@ -316,8 +359,9 @@ void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
     terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
 }
 
-Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress) {
-    return Expansion(gatherer, settings, progress).run();
+Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+                    std::span<const uint8_t> groups) {
+    return Expansion(gatherer, settings, progress, groups).run();
 }
 
 }  // namespace dimmer::cook

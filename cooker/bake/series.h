@@ -17,18 +17,23 @@ struct Series {
     SparseLight radiance;                 // what leaves each receiver, cd/m2
     Sparse<uint32_t> doors_seen;          // by the rays of each receiver, ascending
     std::vector<TermReport> reports;      // per term
-    uint32_t bounces = 0;
+    std::vector<float> threshold_base;    // lux per term: what its threshold is a share of
+    std::vector<uint32_t> bounces;        // per light group
     uint64_t rays = 0;
-    std::vector<std::string> warnings;
 
     // Lit directly counts once it matters as much as the threshold asks of indirect light: a lamp without range lights
     // everything in sight a little.
     bool active(uint32_t term, float direct_lux, float bounced_lux) const;
+    // The largest threshold (BakeSettings) at which the term stays active at the receiver.
+    float keepUpTo(size_t receiver, uint32_t term) const;
     // Ascending: always-on light over free paths, then what is active at the receiver.
     void activeTerms(size_t receiver, std::vector<uint32_t>& terms) const;
 };
 
-// Deterministic for any number of threads. Memory while it runs: 4 bytes * series_rays per texel.
-Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress);
+// Deterministic for any number of threads, and each light group's part is the same whichever others there are.
+// Memory while it runs: 4 bytes * series_rays per texel. `groups`: per light group, whether to follow its light; empty:
+// all.
+Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+                    std::span<const uint8_t> groups = {});
 
 }  // namespace dimmer::cook

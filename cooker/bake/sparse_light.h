@@ -41,6 +41,14 @@ class Sparse {
     size_t entryCount() const { return entries_.size(); }
     size_t bytes() const { return first_.size() * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
 
+    // change(entry) for every entry, in parallel.
+    void forEach(auto&& change) {
+        tbb::parallel_for(size_t{0}, blockCount(entries_.size()), [&](size_t b) {
+            const size_t end = std::min(entries_.size(), (b + 1) * rows_per_block);
+            for (size_t i = b * rows_per_block; i < end; ++i) change(entries_[i]);
+        });
+    }
+
     // Collects rows block by block; blocks may be filled in parallel, the result does not depend on how.
     class Builder {
        public:

@@ -2,6 +2,7 @@
 
 #include <bake/bake.h>
 #include <bake/buried_lights.h>
+#include <bake/sampling.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
@@ -9,15 +10,21 @@
 #include <encode/encode.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
+#include <pipeline/set_scales.h>
+#include <pipeline/settings.h>
 #include <scene/open_pose.h>
 #include <trace/ray_scene.h>
+#include <update/state_text.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
+#include <pack/pack_reader.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
 #include <chrono>
+#include <sstream>
 
 namespace dimmer::cook {
 namespace {
@@ -107,46 +114,145 @@ void describePlaces(const Scene& scene, PackData& pack) {
                                    v.vertical_fov_rad});
 }
 
+UnwrapOptions unwrapOptions(const Profile& profile) {
+    return {profile.texels_per_metre, profile.page_size};
+}
+
+// The level with its charts and receivers.
+struct Charted {
+    std::optional<RayScene> rays;
+    Unwrap charts;
+    Texels texels;
+    Key key;
+};
+
+Expected<void> makeCharts(Scene& scene, const Profile& profile, const Quality& quality, Progress& progress,
+                          Charted& out) {
+    cutAtWalls(scene, profile.texels_per_metre);
+    out.rays.emplace(scene);
+    progress.advance(1);
+    auto unwrapped = unwrap(*out.rays, unwrapOptions(profile));
+    if (!unwrapped) return std::unexpected(unwrapped.error());
+    out.charts = std::move(*unwrapped);
+    out.texels = sampleTexels(*out.rays, out.charts, quality.samples_per_texel);
+    return {};
+}
+
+// Warnings name the level's file, which is no part of the key.
+void stripFile(std::vector<std::string>& warnings, const std::string& file) {
+    for (std::string& w : warnings)
+        if (w.starts_with(file)) w.erase(0, file.size());
+}
+
+// `scene` gets the open leaves of its doors, and faces that walls cut.
+Expected<void> chart(Scene& scene, const Profile& profile, const Quality& quality, Progress& progress, CookCache* cache,
+                     Charted& out) {
+    progress.stage("charts", 2);
+    addOpenLeaves(scene);
+    if (cache) {
+        const Key geometry = geometryKey(scene);
+        out.key = chartsKey(geometry, unwrapOptions(profile), quality.samples_per_texel);
+        cache->dependsOn("geometry", geometry);
+        cache->dependsOn("settings of charts", chartsKey({}, unwrapOptions(profile), quality.samples_per_texel));
+        if (auto found = cache->findCharts(out.key); found && found->meshes.size() == scene.meshes.size()) {
+            for (size_t m = 0; m < scene.meshes.size(); ++m) takeGeometry(scene.meshes[m], std::move(found->meshes[m]));
+            out.charts = std::move(found->charts);
+            for (std::string& w : out.charts.warnings) w = scene.file + w;
+            out.texels = std::move(found->texels);
+            out.rays.emplace(scene);
+            return {};
+        }
+    }
+    if (auto ok = makeCharts(scene, profile, quality, progress, out); !ok) return ok;
+    if (cache) {
+        ChartsEntry entry{scene.meshes, out.charts, out.texels};
+        stripFile(entry.charts.warnings, scene.file);
+        cache->keepCharts(out.key, entry);
+    }
+    return {};
+}
+
+// The scene's light sets are divided by their scales.
+Baked bakeWithCache(const Charted& level, BakeSettings settings, const SetScales& scales, Progress& progress,
+                    CookCache* cache) {
+    for (const glm::vec3 scale : scales.of_group) settings.group_brightness.push_back(luminance(scale));
+    if (!cache) return bake(*level.rays, level.charts, level.texels, settings, progress);
+    const Scene& scene = level.rays->scene();
+    const Key settings_key = bakeSettingsKey(settings);
+    cache->dependsOn("settings of the bake", settings_key);
+    std::vector<Key> keys;
+    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) {
+        const Key lamps = lampsKey(scene, g);
+        cache->dependsOn("lamps of " + describeGroup(scene, g), lamps);
+        keys.push_back(groupKey(level.key, settings_key, settings.thresholdOf(g), lamps));
+        cache->dependsOn("threshold of " + describeGroup(scene, g),
+                         KeyBuilder("").add(settings.thresholdOf(g)).finish());
+    }
+    CachedGroups groups(*cache, scene, std::move(keys));
+    return bake(*level.rays, level.charts, level.texels, settings, progress, &groups);
+}
+
 }  // namespace
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
-    return {.series_rays = quality.series_rays,
-            .final_rays = quality.rays,
-            .emitter_samples = quality.emitter_samples,
-            .noise_max = quality.noise,
-            .denoise = quality.denoise != 0,
-            .bounces_max = quality.bounces,
-            .tail_max = quality.tolerance,
-            .threshold = profile.threshold,
-            .light_grid = quality.light_grid,
-            .per_set_passes = quality.per_set_passes};
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene) {
+    BakeSettings settings{.series_rays = quality.series_rays,
+                          .final_rays = quality.rays,
+                          .emitter_samples = quality.emitter_samples,
+                          .noise_max = quality.noise,
+                          .denoise = quality.denoise != 0,
+                          .bounces_max = quality.bounces,
+                          .tail_max = quality.tolerance,
+                          .threshold = profile.threshold,
+                          .light_grid = quality.light_grid,
+                          .per_set_passes = quality.per_set_passes};
+    settings.group_thresholds.assign(1 + scene.light_sets.size(), profile.threshold);
+    for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
+        if (const auto own = profile.set_thresholds.find(scene.light_sets[s].name); own != profile.set_thresholds.end())
+            settings.group_thresholds[1 + s] = own->second;
+    return settings;
+}
+
+Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set) {
+    std::istringstream texts(scene.settings);
+    for (std::string text; std::getline(texts, text, ',');) {
+        text.erase(0, text.find_first_not_of(' '));
+        text.erase(text.find_last_not_of(' ') + 1);
+        if (text.empty()) continue;
+        if (auto ok = assignText(profile, text, scene.file + ": scene: 'dimmer_settings'", "level"); !ok) return ok;
+    }
+    for (const std::string& text : set)
+        if (auto ok = assignText(profile, text, "--set", "command line"); !ok) return ok;
+    std::vector<std::string_view> names;
+    for (const SceneLightSet& s : scene.light_sets) names.push_back(s.name);
+    for (const auto& [name, threshold] : profile.set_thresholds) {
+        if (std::ranges::find(names, name) != names.end()) continue;
+        const std::string_view nearest = nearestName(name, names);
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: '{}{}' names no light set of this level{}", scene.file, set_threshold_prefix, name,
+                                nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+    }
+    return {};
 }
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
-                             CookStats& stats) {
+                             CookStats& stats, CookCache* cache) {
     const Quality* quality = profile.quality(quality_name);
     if (!quality)
         return fail(ErrorCode::InvalidArgument,
                     fmt::format("there is no quality '{}'; take draft, preview or final", quality_name));
     PackData pack;
-    progress.stage("charts", 2);
-    std::optional<RayScene> rays;
-    Unwrap charts;
-    Texels texels;
+    Charted level;
+    const SetScales scales = divideByScales(scene);
     {
         Stopwatch watch(stats, "charts");
-        addOpenLeaves(scene);
-        cutAtWalls(scene, profile.texels_per_metre);
-        rays.emplace(scene);
-        const auto buried = warningsOfBuriedLights(*rays);
+        if (auto ok = chart(scene, profile, *quality, progress, cache, level); !ok) return std::unexpected(ok.error());
+        const auto buried = warningsOfBuriedLights(*level.rays);
         stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
         progress.advance(1);
-        auto unwrapped = unwrap(*rays, {profile.texels_per_metre, profile.page_size});
-        if (!unwrapped) return std::unexpected(unwrapped.error());
-        charts = std::move(*unwrapped);
-        texels = sampleTexels(*rays, charts, quality->samples_per_texel);
-        progress.advance(1);
     }
+    const Unwrap& charts = level.charts;
+    const Texels& texels = level.texels;
+    const RayScene& rays = *level.rays;
     stats.warnings.insert(stats.warnings.end(), charts.warnings.begin(), charts.warnings.end());
     if (texels.size() == 0)
         return fail(ErrorCode::BadInput, scene.file +
@@ -155,8 +261,9 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Baked baked;
     {
         Stopwatch watch(stats, "bake");
-        const BakeSettings settings = bakeSettings(profile, *quality);
-        baked = bake(*rays, charts, texels, settings, progress);
+        const BakeSettings settings = bakeSettings(profile, *quality, scene);
+        baked = bakeWithCache(level, settings, scales, progress, cache);
+        multiplyByScales(scales, baked);
     }
     stats.rays = baked.rays;
     stats.bounces = baked.bounces;
@@ -178,7 +285,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, contribution_of_term, pack);
-        pack.meshes = levelMeshes(*rays, charts);
+        pack.meshes = levelMeshes(rays, charts, scales.emission_cd_m2);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);
         progress.advance(1);
@@ -186,6 +293,65 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     progress.finish();
     return pack;
 }
+
+namespace {
+
+// Null where the options ask for none, or where only a run without one measures what it is to measure.
+std::optional<CookCache> openCache(const CookOptions& options, CookStats& stats) {
+    if (options.cache.empty() || options.per_set_passes) return {};
+    auto store = CacheStore::open(options.cache);
+    if (store) return CookCache(std::move(*store), options.pack);
+    stats.warnings.push_back("cooked without a cache: " + store.error().message);
+    return {};
+}
+
+Key packKey(const Scene& scene, const Profile& profile, const std::string& quality, CookCache& cache) {
+    const Key level = sceneKey(scene);
+    const Quality* q = profile.quality(quality);
+    const Key settings = KeyBuilder("settings")
+                             .add(profile.settingsJson(quality))
+                             .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{}, scene)))
+                             .finish();
+    cache.dependsOn("level", level);
+    cache.dependsOn("settings", settings);
+    return KeyBuilder("pack").add(level).add(settings).finish();
+}
+
+// The pack of an earlier cook of the same.
+Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
+    auto pack = readPack(entry.pack);
+    if (!pack) return std::unexpected(pack.error());
+    result.pack = std::move(*pack);
+    result.stats.warnings = std::move(entry.warnings);
+    result.stats.bounces = entry.bounces;
+    result.stats.suggested_combinations = std::move(entry.suggested_combinations);
+    return std::move(entry.pack);
+}
+
+Expected<std::vector<std::byte>> makePack(Scene scene, const Profile& profile, const std::string& quality,
+                                          Progress& progress, CookCache* cache, CookResult& result) {
+    auto pack = cookScene(std::move(scene), profile, quality, progress, result.stats, cache);
+    if (!pack) return std::unexpected(pack.error());
+    result.pack = std::move(*pack);
+    if (auto ok = checkBudgets(result.pack, costOf(result.pack), profile); !ok) return std::unexpected(ok.error());
+    Stopwatch watch(result.stats, "write");
+    return packBytes(result.pack);
+}
+
+// From the cache or anew.
+Expected<std::vector<std::byte>> findOrMakePack(Scene scene, const Profile& profile, const std::string& quality,
+                                                Progress& progress, CookCache* cache, CookResult& result) {
+    if (!cache) return makePack(std::move(scene), profile, quality, progress, nullptr, result);
+    const Key key = packKey(scene, profile, quality, *cache);
+    if (auto entry = cache->findPack(key)) return takePack(std::move(*entry), result);
+    auto bytes = makePack(std::move(scene), profile, quality, progress, cache, result);
+    if (bytes)
+        cache->keepPack(key,
+                        {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations});
+    return bytes;
+}
+
+}  // namespace
 
 Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     std::optional<tbb::global_control> limit;
@@ -204,15 +370,21 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     }
     if (!scene) return std::unexpected(scene.error());
     result.stats.warnings = scene->warnings;
-    auto pack = cookScene(*scene, *profile, options.quality, progress, result.stats);
-    if (!pack) return std::unexpected(pack.error());
-    result.pack = std::move(*pack);
-    if (auto ok = checkBudgets(result.pack, costOf(result.pack), *profile); !ok) return std::unexpected(ok.error());
+    if (auto ok = resolveSettings(*profile, *scene, options.set); !ok) return std::unexpected(ok.error());
+    result.profile = *profile;
+    auto cache = openCache(options, result.stats);
+    const auto bytes =
+        findOrMakePack(std::move(*scene), *profile, options.quality, progress, cache ? &*cache : nullptr, result);
+    if (cache) {
+        cache->finish(options.cache_bytes_max);
+        result.stats.cache = cache->lines();
+        for (const std::string& w : cache->warnings()) result.stats.warnings.push_back(w);
+    }
+    if (!bytes) return std::unexpected(bytes.error());
     {
         Stopwatch watch(result.stats, "write");
-        const auto bytes = packBytes(result.pack);
-        result.file_bytes = bytes.size();
-        if (auto ok = writeFileAtomically(options.pack, bytes); !ok) return std::unexpected(ok.error());
+        result.file_bytes = bytes->size();
+        if (auto ok = writeFileAtomically(options.pack, *bytes); !ok) return std::unexpected(ok.error());
     }
     result.stats.peak_bytes = peakBytes();
     return result;

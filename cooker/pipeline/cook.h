@@ -3,6 +3,7 @@
 
 #include <bake/bake.h>
 #include <pack/pack_data.h>
+#include <pipeline/cook_cache.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
 
@@ -18,9 +19,12 @@ struct CookOptions {
     std::filesystem::path level, pack;
     std::string profile = "desktop";
     std::string quality = "preview";
-    uint32_t threads = 0;         // 0: as many as the machine has
-    bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
-    bool light_grid = true;       // false: shadow rays to every light from everywhere, see BakeSettings
+    std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
+    uint32_t threads = 0;               // 0: as many as the machine has
+    bool per_set_passes = false;       // one final gather per light group: a baseline to measure the shared one against
+    bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
+    std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
+    uint64_t cache_bytes_max = uint64_t{4} << 30;
 };
 
 struct CookStats {
@@ -31,16 +35,23 @@ struct CookStats {
     // For `dimmer_combinations`: pairs of doors, as the level writes them, that lose light for want of it.
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;
+    std::vector<CacheLine> cache;  // per stage that a cache could keep; empty without one
 };
 
-// Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data.
+// Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data, whatever the
+// cache has.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
-                             CookStats& stats);
+                             CookStats& stats, CookCache* cache = nullptr);
 
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality);
+BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
+
+// The profile as this cook uses it: what it says, then the level's `dimmer_settings`, then "key=value" texts. Names of
+// light sets that the level does not have are errors.
+Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set);
 
 struct CookResult {
     PackData pack;
+    Profile profile;  // as resolved
     uint64_t file_bytes = 0;
     CookStats stats;
 };

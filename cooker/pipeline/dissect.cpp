@@ -6,6 +6,7 @@
 #include <charts/wall_cuts.h>
 #include <encode/encode.h>
 #include <pipeline/cook.h>
+#include <pipeline/set_scales.h>
 #include <scene/open_pose.h>
 
 #include <tbb/parallel_for.h>
@@ -31,6 +32,7 @@ constexpr float same_normal_cos = 0.99f;
 // The cook up to its last gather.
 struct Rebake {
     Scene scene;
+    SetScales scales;
     std::optional<RayScene> rays;
     Unwrap charts;
     Texels texels;
@@ -47,6 +49,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     const Quality& quality = *settings->profile.quality(settings->quality);
     auto bake = std::make_unique<Rebake>();
     bake->scene = std::move(scene);
+    bake->scales = divideByScales(bake->scene);
     addOpenLeaves(bake->scene);
     cutAtWalls(bake->scene, settings->profile.texels_per_metre);
     bake->rays.emplace(bake->scene);
@@ -60,7 +63,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
     bake->paths.emplace(bake->scene);
     bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
-    bake->settings = bakeSettings(settings->profile, quality);
+    bake->settings = bakeSettings(settings->profile, quality, bake->scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
 }
@@ -106,9 +109,10 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
 // Luminance of terms' light in a state of the sets with every door closed, and the variance of what was gathered.
 class Mixed {
    public:
-    Mixed(const DoorPaths& paths, const ReferenceState& state) {
+    Mixed(const DoorPaths& paths, const SetScales& scales, const ReferenceState& state) {
         for (const Term& t : paths.terms()) {
-            const glm::vec3 lit = t.group == always_group ? glm::vec3(1) : state.set_weights[t.group - 1];
+            const glm::vec3 weight = t.group == always_group ? glm::vec3(1) : state.set_weights[t.group - 1];
+            const glm::vec3 lit = weight * scales.of_group[t.group];
             weights_.push_back(t.doors_open.empty() ? lit : glm::vec3(0));
         }
     }
@@ -324,7 +328,7 @@ Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::spa
     const auto bake = rebake(scene, pack, progress);
     if (!bake) return std::unexpected(bake.error());
     progress.stage("causes of error", points.size());
-    const Mixed mixed(*(*bake)->paths, state);
+    const Mixed mixed(*(*bake)->paths, (*bake)->scales, state);
     std::vector<Steps> steps(points.size());
     tbb::parallel_for(size_t{0}, points.size(), [&](size_t i) {
         steps[i] = stepsAt(**bake, pack, points[i], pairs[i], mixed);

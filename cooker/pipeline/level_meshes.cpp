@@ -42,7 +42,7 @@ class MeshBuilder {
 
 }  // namespace
 
-std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap) {
+std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::span<const glm::vec3> emission_cd_m2) {
     const Scene& scene = rays.scene();
     const auto sets = static_cast<uint32_t>(scene.light_sets.size());
     const glm::vec2 page_size(unwrap.page_width, unwrap.page_height);
@@ -61,8 +61,9 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap) {
             mesh.page = page;
             if (from.door) mesh.door = sets + *from.door;
             mesh.reflectance = array(meanReflectance(scene, material));
-            mesh.emission_cd_m2 = array(material.emission_cd_m2);
-            if (material.emission_cd_m2 != glm::vec3(0)) mesh.emission_set = from.light_set;
+            const glm::vec3 emission = emission_cd_m2.empty() ? material.emission_cd_m2 : emission_cd_m2[t.material];
+            mesh.emission_cd_m2 = array(emission);
+            if (emission != glm::vec3(0)) mesh.emission_set = from.light_set;
         }
         for (int i = 0; i < 3; ++i) {
             const int c = face.back ? (3 - i) % 3 : i;  // seen from its own front

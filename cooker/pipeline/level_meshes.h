@@ -4,8 +4,12 @@
 #include <charts/unwrap.h>
 #include <pack/pack_data.h>
 
+#include <span>
+
 namespace dimmer::cook {
 
-std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap);
+// `emission_cd_m2`: per material, in the place of the scene's own; empty: those.
+std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap,
+                              std::span<const glm::vec3> emission_cd_m2 = {});
 
 }  // namespace dimmer::cook

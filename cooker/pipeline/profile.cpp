@@ -1,5 +1,7 @@
 #include <pipeline/profile.h>
 
+#include <pipeline/json_lines.h>
+#include <pipeline/settings.h>
 #include <shipped_profiles.h>
 #include <update/state_text.h>
 
@@ -8,11 +10,9 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <variant>
 
 namespace dimmer::cook {
 namespace {
@@ -21,49 +21,6 @@ using nlohmann::json;
 
 constexpr int extends_depth_max = 8;
 constexpr const char* base_profile = "desktop";
-
-struct Setting {
-    std::string key;
-    std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*> target;
-    double least = 0, most = 0;  // of a number
-};
-
-// The names of a choice's values, by value.
-constexpr std::array color_formats = {"r11g11b10f", "e5b9g9r9"};
-constexpr std::array direction_models = {"ahd", "linear"};
-constexpr const auto& namesOf(ColorFormat) {
-    return color_formats;
-}
-constexpr const auto& namesOf(DirectionModel) {
-    return direction_models;
-}
-
-std::vector<Setting> settingsOf(Profile& p) {
-    constexpr double any_bytes = 1e15;
-    std::vector<Setting> list = {
-        {"budgets.total", &p.budget_total, 0, any_bytes},
-        {"budgets.base_lightmaps", &p.budget_base_lightmaps, 0, any_bytes},
-        {"budgets.dynamic", &p.budget_dynamic, 0, any_bytes},
-        {"budgets.per_element", &p.budget_per_element, 0, any_bytes},
-        {"lightmaps.texels_per_metre", &p.texels_per_metre, 0.01, 256},
-        {"lightmaps.page_size", &p.page_size, 64, 4096},
-        {"lightmaps.color", &p.color_format},
-        {"lightmaps.model", &p.direction_model},
-        {"records.threshold", &p.threshold, 0, 1},
-    };
-    for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}}) {
-        const std::string prefix = fmt::format("bake.{}.", name);
-        list.push_back({prefix + "samples_per_texel", &q->samples_per_texel, 1, 64});
-        list.push_back({prefix + "series_rays", &q->series_rays, 1, 4096});
-        list.push_back({prefix + "rays", &q->rays, 1, 1 << 20});
-        list.push_back({prefix + "emitter_samples", &q->emitter_samples, 0, 4096});
-        list.push_back({prefix + "noise", &q->noise, 0, 1});
-        list.push_back({prefix + "denoise", &q->denoise, 0, 1});
-        list.push_back({prefix + "bounces", &q->bounces, 1, 1024});
-        list.push_back({prefix + "tolerance", &q->tolerance, 1e-6, 1});
-    }
-    return list;
-}
 
 std::unexpected<Error> bad(const std::string& source, const std::string& text) {
     return fail(ErrorCode::BadInput, fmt::format("profile {}: {}", source, text));
@@ -78,53 +35,6 @@ void flatten(const json& object, const std::string& prefix, std::map<std::string
         else
             out[path] = value;
     }
-}
-
-template <class Choice>
-Expected<void> choose(const Setting& setting, Choice& target, const json& value, const std::string& source) {
-    const auto& names = namesOf(Choice{});
-    const auto name = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
-    if (name == names.end())
-        return bad(source, fmt::format("'{}' must be one of \"{}\"", setting.key, fmt::join(names, "\", \"")));
-    target = static_cast<Choice>(name - names.begin());
-    return {};
-}
-
-Expected<void> assignNumber(const Setting& setting, const json& value, const std::string& source) {
-    if (!value.is_number()) return bad(source, fmt::format("'{}' must be a number", setting.key));
-    const double number = value.get<double>();
-    if (!(number >= setting.least && number <= setting.most))
-        return bad(source,
-                   fmt::format("'{}' is {}, outside {} .. {}", setting.key, number, setting.least, setting.most));
-    const bool whole = !std::holds_alternative<float*>(setting.target);
-    if (whole && number != std::floor(number))
-        return bad(source, fmt::format("'{}' is {}, it must be a whole number", setting.key, number));
-    std::visit(
-        [&](auto* target) {
-            if constexpr (std::is_arithmetic_v<std::remove_pointer_t<decltype(target)>>)
-                *target = static_cast<std::remove_pointer_t<decltype(target)>>(number);
-        },
-        setting.target);
-    return {};
-}
-
-Expected<void> assign(const Setting& setting, const json& value, const std::string& source) {
-    if (const auto* format = std::get_if<ColorFormat*>(&setting.target))
-        return choose(setting, **format, value, source);
-    if (const auto* model = std::get_if<DirectionModel*>(&setting.target))
-        return choose(setting, **model, value, source);
-    return assignNumber(setting, value, source);
-}
-
-// "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
-std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
-    const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
-    if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
-    std::vector<std::string_view> known = {"extends", "description"};
-    for (const Setting& s : settings) known.push_back(s.key);
-    if (const std::string_view nearest = nearestName(key, known); !nearest.empty())
-        return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
-    return fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", "));
 }
 
 // A JSON document with where it stands.
@@ -193,14 +103,14 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     const auto root = parseObject(source);
     if (!root) return std::unexpected(root.error());
     if (auto ok = applyBase(profile, *root, source, depth); !ok) return ok;
-    const auto settings = settingsOf(profile);
     std::map<std::string, json> values;
     flatten(*root, "", values);
+    const auto lines = linesOfKeys(source.text);
     for (const auto& [key, value] : values) {
-        if (key == "extends" || key == "description") continue;
-        const auto it = std::ranges::find(settings, key, &Setting::key);
-        if (it == settings.end()) return bad(source.name, unknownKey(key, value, settings));
-        if (auto ok = assign(*it, value, source.name); !ok) return ok;
+        if (key == "extends" || key == "description" || key == "$schema") continue;
+        const auto line = lines.find(key);
+        const std::string place = line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
+        if (auto ok = assignSetting(profile, key, value, "profile " + place); !ok) return ok;
         profile.origin[key] = source.origin;
     }
     return {};
@@ -212,14 +122,6 @@ double shortDecimal(float value) {
 }
 
 }  // namespace
-
-const char* nameOf(ColorFormat format) {
-    return color_formats[static_cast<size_t>(format)];
-}
-
-const char* nameOf(DirectionModel model) {
-    return direction_models[static_cast<size_t>(model)];
-}
 
 const Quality* Profile::quality(const std::string& name) const {
     if (name == "draft") return &draft;
@@ -248,6 +150,11 @@ std::string Profile::settingsJson(const std::string& quality) const {
             },
             s.target);
     }
+    for (const auto& [set, share] : set_thresholds) {
+        const std::string key = std::string(set_threshold_prefix) + set;
+        const auto from = origin.find(key);
+        out[key] = {{"value", shortDecimal(share)}, {"from", from == origin.end() ? "default" : from->second}};
+    }
     return out.dump();
 }
 
@@ -262,9 +169,10 @@ Expected<CookSettings> readSettings(const std::string& settings_json) {
             return bad(source, fmt::format("'{}' has no value", key));
         const json& value = setting["value"];
         if (key == "quality" && value.is_string()) out.quality = value.get<std::string>();
-        const auto it = std::ranges::find(settings, key, &Setting::key);
-        if (it == settings.end()) continue;
-        if (auto ok = assign(*it, value, source); !ok) return std::unexpected(ok.error());
+        const bool known = std::ranges::find(settings, key, &Setting::key) != settings.end();
+        if (!known && !key.starts_with(set_threshold_prefix)) continue;
+        if (auto ok = assignSetting(out.profile, key, value, "profile " + source); !ok)
+            return std::unexpected(ok.error());
     }
     if (!out.profile.quality(out.quality))
         return bad(source, "no quality is named; the pack was not cooked from a level");

@@ -15,16 +15,16 @@ const char* nameOf(ColorFormat format);
 const char* nameOf(DirectionModel model);
 
 struct Quality {
-    uint32_t samples_per_texel = 4;     // points of a texel that rays start from
-    uint32_t series_rays = 32;          // per texel, for the bounces
-    uint32_t rays = 128;                // per texel and light group at most, for what is stored
-    uint32_t emitter_samples = 8;       // per 32 rays, towards each light group's emitters
-    float noise = 0;                    // rays end when the 95 % interval is within this share of the light; 0: never
-    uint32_t denoise = 0;               // 1: filter the noise that is left
-    uint32_t bounces = 64;              // at most
-    float tolerance = 0.002f;           // bounces stop when what is still to come is below this share of the sum
-    bool per_set_passes = false;        // see BakeSettings; from the command line alone
-    bool light_grid = true;             // likewise
+    uint32_t samples_per_texel = 4;  // points of a texel that rays start from
+    uint32_t series_rays = 32;       // per texel, for the bounces
+    uint32_t rays = 128;             // per texel and light group at most, for what is stored
+    uint32_t emitter_samples = 8;    // per 32 rays, towards each light group's emitters
+    float noise = 0;                 // rays end when the 95 % interval is within this share of the light; 0: never
+    uint32_t denoise = 0;            // 1: filter the noise that is left
+    uint32_t bounces = 64;           // at most
+    float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
+    bool per_set_passes = false;     // see BakeSettings; from the command line alone
+    bool light_grid = true;          // likewise
 };
 
 struct Profile {
@@ -34,10 +34,12 @@ struct Profile {
     uint32_t page_size = 2048;
     ColorFormat color_format = ColorFormat::E5B9G9R9;
     DirectionModel direction_model = DirectionModel::Ahd;
-    float threshold = 0.01f;  // activity, see BakeSettings
+    float threshold = 0.01f;                      // activity, see BakeSettings
+    std::map<std::string, float> set_thresholds;  // for single light sets, by name
     Quality draft, preview, final;
 
-    // Where each setting's value comes from: a shipped profile's name or a file's; what is not listed: "default".
+    // Where each setting's value comes from: a shipped profile's name or a file's, "level", "command line", "fit"; what
+    // is not listed: "default".
     std::map<std::string, std::string> origin;
 
     const Quality* quality(const std::string& name) const;

@@ -12,8 +12,8 @@ constexpr std::array<std::string_view, 12> node_keys = {
     "dimmer_light_set",     "dimmer_max_weight",       "dimmer_bake",     "dimmer_door",    "dimmer_door_open",
     "dimmer_door_rotation", "dimmer_door_translation", "dimmer_lighting", "dimmer_dynamic", "dimmer_texel_density",
     "dimmer_grid_spacing",  "dimmer_play_area"};
-constexpr std::array<std::string_view, 4> scene_keys = {"dimmer_sky_color", "dimmer_sky_luminance", "dimmer_sky_image",
-                                                        "dimmer_combinations"};
+constexpr std::array<std::string_view, 5> scene_keys = {"dimmer_sky_color", "dimmer_sky_luminance", "dimmer_sky_image",
+                                                        "dimmer_combinations", "dimmer_settings"};
 
 bool contains(std::span<const std::string_view> keys, std::string_view key) {
     return std::ranges::count(keys, key) > 0;

@@ -321,6 +321,9 @@ class LevelImporter {
         Extras extras(context_);
         extras.add(sceneExtras(), "scene");
         if (const auto ok = elements_.combinations(extras); !ok) return ok;
+        const auto settings = extras.text("dimmer_settings");
+        if (!settings) return std::unexpected(settings.error());
+        scene_.settings = settings->value_or("");
         if (scene_.meshes.empty())
             return context_.error("scene",
                                   "holds no triangles, so there is nothing to light. Export the level's meshes.");

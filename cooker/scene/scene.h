@@ -124,6 +124,7 @@ struct Scene {
     glm::vec3 sky_radiance_cd_m2{0};          // of the whole sky; with an image: what its texels are multiplied by
     // Equirectangular, rows from the top (+Y); the middle column is +X, to its right comes +Z. Null: a constant sky.
     std::shared_ptr<const Image> sky_image;
+    std::string settings;               // of the cook, as the level has them: "key=value, key=value"
     std::vector<std::string> warnings;  // each names the file, the node and what was done
 };
 

@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <tbb/parallel_for.h>
 #include <unistd.h>
 #include <zstd.h>
 
@@ -44,31 +45,51 @@ class Writer {
         addTable(ChunkType::Meshes, [&](ByteWriter& out) { putMeshes(out); });
         addTable(ChunkType::Viewpoints, [&](ByteWriter& out) { putViewpoints(out); });
         addTable(ChunkType::Settings, [&](ByteWriter& out) { out.putString(d_.settings_json); });
+        compressAll();
         return assemble();
     }
 
    private:
-    void add(ChunkType type, uint32_t subject, std::span<const std::byte> bytes, uint32_t record_bytes) {
+    // Chunks are compressed together at the end, on all threads: the larger part of writing a pack.
+    struct Content {
+        std::vector<std::byte> own;  // of tables
+        std::span<const std::byte> bytes;
+    };
+
+    void add(ChunkType type, uint32_t subject, Content content, uint32_t record_bytes) {
+        chunks_.push_back({.type = static_cast<uint32_t>(type),
+                           .flags = 0,
+                           .subject = subject,
+                           .shuffle = record_bytes,
+                           .offset = 0,
+                           .stored_bytes = 0,
+                           .real_bytes = content.bytes.size(),
+                           .xxh64 = 0});
+        contents_.push_back(std::move(content));
+    }
+
+    void compressAll() {
+        bodies_.resize(chunks_.size());
+        tbb::parallel_for(size_t{0}, chunks_.size(), [&](size_t i) {
+            bodies_[i] = compressed(contents_[i].bytes, chunks_[i].shuffle);
+            chunks_[i].stored_bytes = bodies_[i].size();
+            chunks_[i].xxh64 = format::chunkHash(bodies_[i]);
+        });
+    }
+
+    static std::vector<std::byte> compressed(std::span<const std::byte> bytes, uint32_t record_bytes) {
         std::vector<std::byte> shuffled(bytes.size());
         const size_t count = bytes.size() / record_bytes;
         for (size_t b = 0; b < record_bytes; ++b)
             for (size_t i = 0; i < count; ++i) shuffled[b * count + i] = bytes[i * record_bytes + b];
         std::vector<std::byte> stored(ZSTD_compressBound(shuffled.size()));
         stored.resize(ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), compression_level));
-        chunks_.push_back({.type = static_cast<uint32_t>(type),
-                           .flags = 0,
-                           .subject = subject,
-                           .shuffle = record_bytes,
-                           .offset = 0,
-                           .stored_bytes = stored.size(),
-                           .real_bytes = bytes.size(),
-                           .xxh64 = format::chunkHash(stored)});
-        bodies_.push_back(std::move(stored));
+        return stored;
     }
 
     template <class T>
     void addArray(ChunkType type, std::span<const T> values, uint32_t subject = 0) {
-        add(type, subject, std::as_bytes(values), sizeof(T));
+        add(type, subject, {{}, std::as_bytes(values)}, sizeof(T));
     }
 
     void addProbes(const ProbeData& probes) {
@@ -91,7 +112,9 @@ class Writer {
     void addTable(ChunkType type, auto&& fill) {
         ByteWriter out;
         fill(out);
-        add(type, 0, out.take(), 1);
+        Content content{out.take(), {}};
+        content.bytes = content.own;
+        add(type, 0, std::move(content), 1);
     }
 
     static void putOptional(ByteWriter& out, std::optional<uint32_t> index) { out.put(index.value_or(UINT32_MAX)); }
@@ -185,6 +208,7 @@ class Writer {
 
     const PackData& d_;
     std::vector<Chunk> chunks_;
+    std::vector<Content> contents_;  // moving one leaves its bytes where they are
     std::vector<std::vector<std::byte>> bodies_;
 };
 
@@ -218,12 +242,12 @@ bool giveUsualRights(int file) {
     return fchmod(file, 0666 & ~mask) == 0;
 }
 
-Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes, Flush flush) {
     const std::scoped_lock lock(fileReplacement());
     std::string temporary = path.string() + ".XXXXXX";
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
-    const bool written = writeAll(file, bytes) && giveUsualRights(file) && fsync(file) == 0;
+    const bool written = writeAll(file, bytes) && giveUsualRights(file) && (flush == Flush::No || fsync(file) == 0);
     const int error = written ? 0 : errno;
     close(file);
     if (written && rename(temporary.c_str(), path.c_str()) == 0) return {};
@@ -255,7 +279,7 @@ Expected<void> checkWritable(const std::filesystem::path& path) {
     return {};
 }
 
-Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes, Flush flush) {
     if (auto ok = checkWritable(path); !ok) return ok;
     std::error_code error;
     const auto status = std::filesystem::status(path, error);
@@ -264,7 +288,7 @@ Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<
     // The file that a link stands for is what the user means to replace.
     const auto target =
         std::filesystem::is_symlink(path, error) ? std::filesystem::weakly_canonical(path, error) : path;
-    return replaceFile(error ? path : target, bytes);
+    return replaceFile(error ? path : target, bytes, flush);
 }
 
 }  // namespace dimmer::cook

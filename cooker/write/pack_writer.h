@@ -20,8 +20,12 @@ Expected<void> checkWritable(const std::filesystem::path& path);
 // Held while writeFileAtomically() has a temporary file: who ends the process from another thread takes it first.
 std::mutex& fileReplacement();
 
+// Whether a file has to survive a power cut right after it was written.
+enum class Flush { Yes, No };
+
 // Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete. Links are
 // followed; devices and pipes are written to directly.
-Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
+                                   Flush flush = Flush::Yes);
 
 }  // namespace dimmer::cook

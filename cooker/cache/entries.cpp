@@ -1,0 +1,173 @@
+#include <cache/entries.h>
+
+#include <format/byte_stream.h>
+
+namespace dimmer::cook {
+namespace {
+
+using format::ByteReader;
+using format::ByteWriter;
+
+template <class T>
+void putAll(ByteWriter& out, const std::vector<T>& values) {
+    out.putArray(std::span<const T>(values));
+}
+
+// The fields of both directions are listed once: `visit` is a ByteWriter's put or a ByteReader's get.
+void visitMesh(auto& mesh, auto&& visit) {
+    visit(mesh.positions_m);
+    visit(mesh.normals);
+    visit(mesh.uv0);
+    visit(mesh.uv1);
+    visit(mesh.triangles);
+    visit(mesh.triangle_materials);
+    visit(mesh.triangle_regions);
+}
+
+void visitUnwrap(auto& u, auto&& visit) {
+    visit(u.faces);
+    visit(u.uv_texels);
+    visit(u.face_chart);
+    visit(u.frames);
+    visit(u.texel_area_m2);
+    visit(u.front_face);
+    visit(u.back_face);
+    visit(u.charts);
+}
+
+void visitTexels(auto& t, auto&& visit) {
+    visit(t.address);
+    visit(t.area_m2);
+    visit(t.reflectance);
+    visit(t.first_sample);
+    visit(t.samples);
+    visit(t.fills);
+    visit(t.receiver_at);
+}
+
+template <class T>
+void getAll(ByteReader& in, std::vector<T>& values) {
+    values = in.getArray<T>();
+}
+
+// Columns of bytes: the first bytes of all floats, then the second of all, and so on, which zstd packs better.
+void putFloats(ByteWriter& out, const std::vector<float>& values) {
+    const auto raw = std::as_bytes(std::span(values));
+    std::vector<std::byte> columns(raw.size());
+    for (size_t b = 0; b < sizeof(float); ++b)
+        for (size_t i = 0; i < values.size(); ++i) columns[b * values.size() + i] = raw[i * sizeof(float) + b];
+    putAll(out, columns);
+}
+
+std::vector<float> getFloats(ByteReader& in) {
+    const auto columns = in.getArray<std::byte>();
+    std::vector<float> values(columns.size() / sizeof(float));
+    const auto raw = std::as_writable_bytes(std::span(values));
+    for (size_t b = 0; b < sizeof(float); ++b)
+        for (size_t i = 0; i < values.size(); ++i) raw[i * sizeof(float) + b] = columns[b * values.size() + i];
+    return values;
+}
+
+// What is kept of a ReceiverLight, besides its term.
+struct StoredLight {
+    Gathered light;
+    float keep;
+};
+constexpr size_t floats_per_light = 8;
+static_assert(sizeof(StoredLight) == floats_per_light * sizeof(float));
+
+}  // namespace
+
+void takeGeometry(SceneMesh& mesh, SceneMesh&& from) {
+    mesh.positions_m = std::move(from.positions_m);
+    mesh.normals = std::move(from.normals);
+    mesh.uv0 = std::move(from.uv0);
+    mesh.uv1 = std::move(from.uv1);
+    mesh.triangles = std::move(from.triangles);
+    mesh.triangle_materials = std::move(from.triangle_materials);
+    mesh.triangle_regions = std::move(from.triangle_regions);
+}
+
+std::vector<std::byte> toBytes(const ChartsEntry& entry) {
+    ByteWriter out;
+    out.put(uint64_t{entry.meshes.size()});
+    const auto put = [&](const auto& values) { putAll(out, values); };
+    for (const SceneMesh& mesh : entry.meshes) visitMesh(mesh, put);
+    out.put(std::array{entry.charts.page_width, entry.charts.page_height, entry.charts.page_count});
+    visitUnwrap(entry.charts, put);
+    out.put(uint64_t{entry.charts.warnings.size()});
+    for (const std::string& warning : entry.charts.warnings) out.putString(warning);
+    visitTexels(entry.texels, put);
+    return out.take();
+}
+
+std::optional<ChartsEntry> chartsFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    ChartsEntry entry;
+    const auto get = [&](auto& values) { getAll(in, values); };
+    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) visitMesh(entry.meshes.emplace_back(), get);
+    const auto size = in.get<std::array<uint32_t, 3>>();
+    entry.charts.page_width = size[0];
+    entry.charts.page_height = size[1];
+    entry.charts.page_count = size[2];
+    visitUnwrap(entry.charts, get);
+    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) entry.charts.warnings.push_back(in.getString());
+    visitTexels(entry.texels, get);
+    return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
+}
+
+std::vector<std::byte> toBytes(const GroupLight& group) {
+    std::vector<uint16_t> counts, terms;
+    std::vector<float> columns(group.light.entryCount() * floats_per_light);
+    size_t n = 0;
+    for (size_t i = 0; i < group.light.rows(); ++i) {
+        counts.push_back(static_cast<uint16_t>(group.light.row(i).size()));
+        for (const ReceiverLight& l : group.light.row(i)) {
+            terms.push_back(static_cast<uint16_t>(l.term));
+            const auto values = std::bit_cast<std::array<float, floats_per_light>>(StoredLight{l.light, l.keep});
+            for (size_t f = 0; f < floats_per_light; ++f) columns[f * group.light.entryCount() + n] = values[f];
+            ++n;
+        }
+    }
+    ByteWriter out;
+    out.put(group.bounces);
+    putAll(out, group.reports);
+    putAll(out, group.door_flux.alone);
+    putAll(out, group.door_flux.pairs);
+    putAll(out, counts);
+    putAll(out, terms);
+    putFloats(out, columns);
+    return out.take();
+}
+
+std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    GroupLight group;
+    group.bounces = in.get<uint32_t>();
+    group.reports = in.getArray<TermReport>();
+    group.door_flux.alone = in.getArray<double>();
+    group.door_flux.pairs = in.getArray<DoorFlux::Pair>();
+    const auto counts = in.getArray<uint16_t>();
+    const auto terms = in.getArray<uint16_t>();
+    const std::vector<float> columns = getFloats(in);
+    if (!in.atEnd() || columns.size() != terms.size() * floats_per_light) return {};
+    Sparse<ReceiverLight>::Builder rows(counts.size());
+    std::vector<ReceiverLight> row;
+    size_t n = 0;
+    for (size_t i = 0; i < counts.size(); ++i) {
+        row.clear();
+        if (n + counts[i] > terms.size()) return {};
+        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
+            std::array<float, floats_per_light> values;
+            for (size_t f = 0; f < floats_per_light; ++f) values[f] = columns[f * terms.size() + n];
+            if (terms[n] >= group.reports.size()) return {};
+            const auto stored = std::bit_cast<StoredLight>(values);
+            row.push_back({terms[n], stored.light, 0, stored.keep});
+        }
+        rows.put(i, row);
+    }
+    group.light = rows.finish();
+    return group;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,157 @@
+#include <cache/scene_keys.h>
+
+#include <scene/ies.h>
+
+namespace dimmer::cook {
+namespace {
+
+KeyBuilder& add(KeyBuilder& key, glm::vec3 v) {
+    for (int c = 0; c < 3; ++c) key.add(v[c]);
+    return key;
+}
+
+template <class T>
+KeyBuilder& addAll(KeyBuilder& key, const std::vector<T>& values) {
+    return key.addArray(std::span<const T>(values));
+}
+
+// What a material does to light that it did not emit.
+void addSurface(KeyBuilder& key, const Material& m) {
+    key.add(m.name);
+    add(key, m.base_color);
+    key.add(m.metallic).add(m.specular).add(m.alpha).add(m.alpha_mode).add(m.alpha_cutoff);
+    key.add(uint32_t{m.double_sided}).addOptional(m.base_color_image);
+}
+
+void addImage(KeyBuilder& key, const Image& image) {
+    key.add(image.width).add(image.height);
+    addAll(key, image.texels);
+}
+
+void addMesh(KeyBuilder& key, const SceneMesh& mesh) {
+    key.add(mesh.node);
+    addAll(key, mesh.positions_m);
+    addAll(key, mesh.normals);
+    addAll(key, mesh.uv0);
+    addAll(key, mesh.uv1);
+    addAll(key, mesh.triangles);
+    addAll(key, mesh.triangle_materials);
+    addAll(key, mesh.triangle_regions);
+    key.add(mesh.lighting).addOptional(mesh.door).add(uint32_t{mesh.is_open_leaf});
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row) key.add(std::bit_cast<uint64_t>(mesh.open_from_closed[column][row]));
+    key.addOptional(mesh.texels_per_metre).addOptional(mesh.grid_spacing_m);
+}
+
+void addLamp(KeyBuilder& key, const PunctualLight& light) {
+    key.add(light.type).add(light.bake);
+    add(key, light.position_m);
+    add(key, light.direction);
+    add(key, light.intensity);
+    key.addOptional(light.range_m).add(light.cone_inner_cos).add(light.cone_outer_cos);
+    key.add(uint32_t{light.profile != nullptr});
+    if (!light.profile) return;
+    addAll(key, light.profile->vertical_deg);
+    addAll(key, light.profile->horizontal_deg);
+    addAll(key, light.profile->share);
+    for (int column = 0; column < 3; ++column) add(key, light.profile_from_world[column]);
+}
+
+void addSky(KeyBuilder& key, const Scene& scene) {
+    add(key, scene.sky_radiance_cd_m2);
+    key.add(uint32_t{scene.sky_image != nullptr});
+    if (scene.sky_image) addImage(key, *scene.sky_image);
+}
+
+}  // namespace
+
+Key geometryKey(const Scene& scene) {
+    KeyBuilder key("geometry");
+    key.add(uint64_t{scene.materials.size()});
+    for (const Material& m : scene.materials) addSurface(key, m);
+    key.add(uint64_t{scene.images.size()});
+    for (const Image& image : scene.images) addImage(key, image);
+    key.add(uint64_t{scene.meshes.size()});
+    for (const SceneMesh& mesh : scene.meshes) addMesh(key, mesh);
+    key.add(uint64_t{scene.doors.size()});
+    for (const SceneDoor& door : scene.doors) key.add(door.name).add(uint32_t{door.pose});
+    key.add(uint64_t{scene.combinations.size()});
+    for (const auto& combination : scene.combinations) {
+        key.add(uint64_t{combination.size()});
+        for (const ElementRef& e : combination) {
+            key.add(uint32_t{e.is_door});
+            key.add(e.is_door ? scene.doors[e.index].name : scene.light_sets[e.index].name);
+        }
+    }
+    return key.finish();
+}
+
+Key sceneKey(const Scene& scene) {
+    KeyBuilder key("scene");
+    key.add(geometryKey(scene)).add(scene.file);
+    key.add(uint64_t{scene.light_sets.size()});
+    for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
+        key.add(scene.light_sets[s].name).add(scene.light_sets[s].max_weight);
+    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) key.add(lampsKey(scene, g));
+    key.add(uint64_t{scene.viewpoints.size()});
+    for (const SceneViewpoint& v : scene.viewpoints) {
+        key.add(v.name).add(v.vertical_fov_rad);
+        add(add(key, v.position_m), v.forward);
+    }
+    addAll(key, scene.dynamic_places_m);
+    key.add(uint64_t{scene.warnings.size()});
+    for (const std::string& warning : scene.warnings) key.add(warning);
+    return key.finish();
+}
+
+Key chartsKey(const Key& geometry, const UnwrapOptions& options, uint32_t samples_per_texel) {
+    return KeyBuilder("charts")
+        .add(geometry)
+        .add(options.texels_per_metre)
+        .add(options.page_size)
+        .add(samples_per_texel)
+        .finish();
+}
+
+Key bakeSettingsKey(const BakeSettings& s) {
+    return KeyBuilder("bake settings")
+        .add(s.series_rays)
+        .add(s.final_rays)
+        .add(s.emitter_samples)
+        .add(s.noise_max)
+        .add(uint32_t{s.denoise})
+        .add(s.bounces_max)
+        .add(s.tail_max)
+        .add(s.seed)
+        .add(uint32_t{s.light_grid})
+        .finish();
+}
+
+Key lampsKey(const Scene& scene, uint32_t group) {
+    KeyBuilder key("lamps");
+    if (group == always_group)
+        addSky(key, scene);
+    else
+        key.add(scene.light_sets[group - 1].name);
+    for (const PunctualLight& light : scene.lights)
+        if (groupOf(light.light_set) == group && light.bake != BakeMode::None) addLamp(key, light);
+    key.add(std::string_view("emitters"));
+    for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
+        const SceneMesh& mesh = scene.meshes[m];
+        if (groupOf(mesh.light_set) != group) continue;
+        glm::vec3 last(0);
+        for (uint32_t t = 0; t < mesh.triangle_materials.size(); ++t) {
+            const glm::vec3 emission = scene.materials[mesh.triangle_materials[t]].emission_cd_m2;
+            if (emission == last) continue;
+            add(key.add(m).add(t), emission);
+            last = emission;
+        }
+    }
+    return key.finish();
+}
+
+Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps) {
+    return KeyBuilder("light").add(charts).add(settings).add(threshold).add(lamps).finish();
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,31 @@
+// What the stages of a cook depend on, as keys.
+#pragma once
+
+#include <bake/bake.h>
+#include <cache/key.h>
+#include <charts/unwrap.h>
+#include <scene/scene.h>
+
+#include <vector>
+
+namespace dimmer::cook {
+
+// Meshes, doors and materials without what they emit: all that decides where receivers are and what rays meet.
+Key geometryKey(const Scene& scene);
+
+// Everything in a level.
+Key sceneKey(const Scene& scene);
+
+// Charts and receivers.
+Key chartsKey(const Key& geometry, const UnwrapOptions& options, uint32_t samples_per_texel);
+
+// The settings that every light group's light depends on, and so neither thresholds nor how passes are arranged.
+Key bakeSettingsKey(const BakeSettings& settings);
+
+// The lamps and emitters of a light group, the always-on group's sky included.
+Key lampsKey(const Scene& scene, uint32_t group);
+
+// A group's finished light.
+Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps);
+
+}  // namespace dimmer::cook

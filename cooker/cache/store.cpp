@@ -1,0 +1,125 @@
+#include <cache/store.h>
+
+#include <pack/decompress.h>
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <fstream>
+
+namespace dimmer::cook {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view extension = ".entry";
+// Level 1 packs the floats of light to some 80 % at several hundred MB/s; higher levels cost more time than they save.
+constexpr int compression_level = 1;
+// A file without its final name that is older than this belongs to no cook that still runs.
+constexpr auto abandoned_after = std::chrono::hours(24);
+
+struct EntryHeader {
+    std::array<char, 8> magic;
+    uint64_t stored_bytes, real_bytes;
+    uint64_t hash_high, hash_low;  // XXH3, 128 bits, of the stored bytes
+};
+constexpr std::array<char, 8> entry_magic = {'D', 'I', 'M', 'C', 'A', 'C', 'H', '1'};
+
+std::vector<std::byte> readFile(const fs::path& path) {
+    std::ifstream file(path, std::ios::binary | std::ios::ate);
+    if (!file) return {};
+    std::vector<std::byte> bytes(static_cast<size_t>(std::max<std::streamoff>(file.tellg(), 0)));
+    file.seekg(0);
+    file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+    bytes.resize(static_cast<size_t>(file.gcount()));
+    return bytes;
+}
+
+std::optional<std::vector<std::byte>> decode(std::span<const std::byte> file) {
+    EntryHeader header{};
+    if (file.size() < sizeof(header)) return {};
+    std::memcpy(&header, file.data(), sizeof(header));
+    const auto stored = file.subspan(sizeof(header));
+    if (header.magic != entry_magic || stored.size() != header.stored_bytes) return {};
+    const XXH128_hash_t hash = XXH3_128bits(stored.data(), stored.size());
+    if (hash.high64 != header.hash_high || hash.low64 != header.hash_low) return {};
+    return decompress(stored, header.real_bytes);
+}
+
+std::vector<std::byte> encode(std::span<const std::byte> bytes) {
+    std::vector<std::byte> file(sizeof(EntryHeader) + ZSTD_compressBound(bytes.size()));
+    std::byte* stored = file.data() + sizeof(EntryHeader);
+    const size_t size =
+        ZSTD_compress(stored, file.size() - sizeof(EntryHeader), bytes.data(), bytes.size(), compression_level);
+    const XXH128_hash_t hash = XXH3_128bits(stored, size);
+    const EntryHeader header{entry_magic, size, bytes.size(), hash.high64, hash.low64};
+    std::memcpy(file.data(), &header, sizeof(header));
+    file.resize(sizeof(header) + size);
+    return file;
+}
+
+}  // namespace
+
+Expected<CacheStore> CacheStore::open(fs::path folder) {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (!fs::is_directory(folder, error))
+        return fail(ErrorCode::Io, fmt::format("{}: the cache's folder cannot be made", folder.string()));
+    return CacheStore(std::move(folder));
+}
+
+fs::path CacheStore::path(std::string_view kind, const Key& key) const {
+    return folder_ / fmt::format("{}-{}{}", kind, key.hex(), extension);
+}
+
+Entry CacheStore::find(std::string_view kind, const Key& key) const {
+    const fs::path file = path(kind, key);
+    std::error_code ignored;
+    if (!fs::exists(file, ignored)) return {};
+    auto bytes = decode(readFile(file));
+    if (!bytes) return {Find::Damaged, {}};
+    fs::last_write_time(file, fs::file_time_type::clock::now(), ignored);
+    return {Find::Hit, std::move(*bytes)};
+}
+
+Expected<void> CacheStore::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const {
+    // Not flushed: what a power cut leaves half written is found to be damaged.
+    return writeFileAtomically(path(kind, key), encode(bytes), Flush::No);
+}
+
+uint64_t CacheStore::trim(uint64_t bytes_max) const {
+    struct File {
+        fs::path path;
+        fs::file_time_type used;
+        uint64_t bytes;
+    };
+    std::vector<File> files;
+    uint64_t sum = 0;
+    std::error_code error;
+    const auto now = fs::file_time_type::clock::now();
+    for (fs::directory_iterator it(folder_, error), end; !error && it != end; it.increment(error)) {
+        // Others may remove files at the same time: what cannot be asked about is gone.
+        std::error_code gone;
+        const File file{it->path(), it->last_write_time(gone), it->file_size(gone)};
+        if (gone || file.path.filename().string().find(extension) == std::string::npos) continue;
+        if (file.path.extension() == extension)
+            files.push_back(file);
+        else if (now - file.used > abandoned_after)
+            fs::remove(file.path, gone);
+        sum += file.path.extension() == extension ? file.bytes : 0;
+    }
+    std::ranges::sort(files,
+                      [](const File& a, const File& b) { return std::tie(a.used, a.path) < std::tie(b.used, b.path); });
+    for (size_t i = 0; i < files.size() && sum > bytes_max; ++i) {
+        fs::remove(files[i].path, error);
+        sum -= files[i].bytes;
+    }
+    return sum;
+}
+
+}  // namespace dimmer::cook

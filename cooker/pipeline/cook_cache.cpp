@@ -1,0 +1,141 @@
+#include <pipeline/cook_cache.h>
+
+#include <format/byte_stream.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <sstream>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr std::string_view charts_kind = "charts", light_kind = "light", pack_kind = "pack", ledger_kind = "ledger";
+
+std::vector<std::byte> toBytes(const PackEntry& entry) {
+    format::ByteWriter out;
+    out.put(entry.bounces);
+    out.put(static_cast<uint32_t>(entry.warnings.size()));
+    for (const std::string& warning : entry.warnings) out.putString(warning);
+    out.put(static_cast<uint32_t>(entry.suggested_combinations.size()));
+    for (const auto& [first, second] : entry.suggested_combinations) {
+        out.putString(first);
+        out.putString(second);
+    }
+    out.putArray(std::span<const std::byte>(entry.pack));
+    return out.take();
+}
+
+std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
+    format::ByteReader in(bytes);
+    PackEntry entry;
+    entry.bounces = in.get<uint32_t>();
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.warnings.push_back(in.getString());
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {
+        auto& [first, second] = entry.suggested_combinations.emplace_back();
+        first = in.getString();
+        second = in.getString();
+    }
+    entry.pack = in.getArray<std::byte>();
+    return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
+}
+
+// "part\tkey" lines.
+std::map<std::string, std::string> readLedger(std::span<const std::byte> bytes) {
+    std::map<std::string, std::string> parts;
+    std::istringstream text(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
+    for (std::string part, key; std::getline(text, part, '\t') && std::getline(text, key);) parts[part] = key;
+    return parts;
+}
+
+}  // namespace
+
+CookCache::CookCache(CacheStore store, const std::filesystem::path& pack) : store_(std::move(store)) {
+    std::error_code ignored;
+    const auto place = std::filesystem::weakly_canonical(pack, ignored);
+    ledger_ = KeyBuilder::ofAnyCode(ledger_kind).add(place.string()).finish();
+    last_ = readLedger(store_.find(ledger_kind, ledger_).bytes);
+    dependsOn("code", KeyBuilder("code").finish());
+}
+
+void CookCache::dependsOn(const std::string& part, const Key& key) {
+    now_[part] = key.hex();
+}
+
+std::string CookCache::whyMissing(Find find, const std::vector<std::string>& parts) const {
+    if (find == Find::Damaged) return "the entry is damaged";
+    if (last_.empty()) return "first cook of this pack here";
+    std::vector<std::string> changed;
+    for (const std::string& part : parts) {
+        const auto now = now_.find(part), last = last_.find(part);
+        if (now == now_.end()) continue;
+        if (last == last_.end())
+            changed.push_back(part + " is new");
+        else if (last->second != now->second)
+            changed.push_back(part + " changed");
+    }
+    return changed.empty() ? "no longer in the cache" : fmt::format("{}", fmt::join(changed, ", "));
+}
+
+std::optional<std::vector<std::byte>> CookCache::find(std::string_view kind, const std::string& what, const Key& key,
+                                                      const std::vector<std::string>& parts) {
+    Entry entry = store_.find(kind, key);
+    const bool hit = entry.find == Find::Hit;
+    lines_.push_back({what, hit, hit ? "" : whyMissing(entry.find, parts)});
+    return hit ? std::optional(std::move(entry.bytes)) : std::nullopt;
+}
+
+void CookCache::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) {
+    const auto kept = store_.keep(kind, key, bytes);
+    if (!kept && warnings_.empty()) warnings_.push_back("the cache takes no entries: " + kept.error().message);
+}
+
+std::optional<ChartsEntry> CookCache::findCharts(const Key& key) {
+    const auto bytes = find(charts_kind, "charts", key, {"code", "geometry", "settings of charts"});
+    return bytes ? chartsFromBytes(*bytes) : std::nullopt;
+}
+
+void CookCache::keepCharts(const Key& key, const ChartsEntry& entry) {
+    keep(charts_kind, key, cook::toBytes(entry));
+}
+
+std::optional<PackEntry> CookCache::findPack(const Key& key) {
+    const auto bytes = find(pack_kind, "pack", key, {"code", "level", "settings"});
+    return bytes ? packFromBytes(*bytes) : std::nullopt;
+}
+
+void CookCache::keepPack(const Key& key, const PackEntry& entry) {
+    keep(pack_kind, key, toBytes(entry));
+}
+
+std::optional<GroupLight> CookCache::findGroup(const std::string& what, const Key& key) {
+    const auto bytes = find(
+        light_kind, what, key,
+        {"code", "geometry", "settings of charts", "settings of the bake", "threshold of " + what, "lamps of " + what});
+    return bytes ? groupFromBytes(*bytes) : std::nullopt;
+}
+
+void CookCache::keepGroup(const Key& key, const GroupLight& light) {
+    keep(light_kind, key, cook::toBytes(light));
+}
+
+void CookCache::finish(uint64_t bytes_max) {
+    // A pack that was found whole asked for no parts: what is known of them stays.
+    auto all = now_;
+    all.insert(last_.begin(), last_.end());
+    std::string ledger;
+    for (const auto& [part, key] : all) ledger += part + "\t" + key + "\n";
+    if (all != last_) keep(ledger_kind, ledger_, std::as_bytes(std::span(ledger)));
+    store_.trim(bytes_max);
+}
+
+std::string describeGroup(const Scene& scene, uint32_t group) {
+    return group == always_group ? "always-on light" : fmt::format("light set '{}'", scene.light_sets[group - 1].name);
+}
+
+std::optional<GroupLight> CachedGroups::find(uint32_t group) {
+    return cache_.findGroup(describeGroup(scene_, group), keys_[group]);
+}
+
+}  // namespace dimmer::cook

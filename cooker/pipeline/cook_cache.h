@@ -1,0 +1,83 @@
+// The stages of a cook that are kept from one cook to the next, and what is said of them.
+#pragma once
+
+#include <cache/entries.h>
+#include <cache/scene_keys.h>
+#include <cache/store.h>
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+// What became of one stage.
+struct CacheLine {
+    std::string what;  // "charts", "always-on light", "light set 'hall'", "pack"
+    bool reused = false;
+    std::string why;  // it had to be made again; empty where it was reused
+};
+
+// A pack and what its cook had to say.
+struct PackEntry {
+    std::vector<std::byte> pack;
+    uint32_t bounces = 0;
+    std::vector<std::string> warnings;
+    std::vector<std::pair<std::string, std::string>> suggested_combinations;
+};
+
+// The cache as one cook of one pack uses it. Remembers what the last cook of the pack depended on, to say what changed.
+class CookCache {
+   public:
+    CookCache(CacheStore store, const std::filesystem::path& pack);
+
+    // What the cook depends on, by name; the names of those that differ from the last cook's explain what is made
+    // again.
+    void dependsOn(const std::string& part, const Key& key);
+
+    std::optional<ChartsEntry> findCharts(const Key& key);
+    void keepCharts(const Key& key, const ChartsEntry& entry);
+    std::optional<PackEntry> findPack(const Key& key);
+    void keepPack(const Key& key, const PackEntry& entry);
+    std::optional<GroupLight> findGroup(const std::string& what, const Key& key);
+    void keepGroup(const Key& key, const GroupLight& light);
+
+    // Ends the cook: removes old entries, and remembers what this one depended on.
+    void finish(uint64_t bytes_max);
+
+    const std::vector<CacheLine>& lines() const { return lines_; }
+    // What did not work; the cook goes on without.
+    const std::vector<std::string>& warnings() const { return warnings_; }
+
+   private:
+    std::optional<std::vector<std::byte>> find(std::string_view kind, const std::string& what, const Key& key,
+                                               const std::vector<std::string>& parts);
+    void keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes);
+    std::string whyMissing(Find find, const std::vector<std::string>& parts) const;
+
+    CacheStore store_;
+    Key ledger_;
+    std::map<std::string, std::string> last_, now_;  // part -> key
+    std::vector<CacheLine> lines_;
+    std::vector<std::string> warnings_;
+};
+
+// The groups of one bake.
+class CachedGroups final : public GroupStore {
+   public:
+    // `keys`: per light group.
+    CachedGroups(CookCache& cache, const Scene& scene, std::vector<Key> keys)
+        : cache_(cache), scene_(scene), keys_(std::move(keys)) {}
+    std::optional<GroupLight> find(uint32_t group) override;
+    void keep(uint32_t group, const GroupLight& light) override { cache_.keepGroup(keys_[group], light); }
+
+   private:
+    CookCache& cache_;
+    const Scene& scene_;
+    std::vector<Key> keys_;
+};
+
+// "always-on light" or "light set 'hall'".
+std::string describeGroup(const Scene& scene, uint32_t group);
+
+}  // namespace dimmer::cook

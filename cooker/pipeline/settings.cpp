@@ -1,0 +1,216 @@
+#include <pipeline/settings.h>
+
+#include <update/state_text.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace dimmer::cook {
+namespace {
+
+using nlohmann::json;
+
+// The names of a choice's values, by value.
+constexpr std::array color_formats = {"r11g11b10f", "e5b9g9r9"};
+constexpr std::array direction_models = {"ahd", "linear"};
+constexpr const auto& namesOf(ColorFormat) {
+    return color_formats;
+}
+constexpr const auto& namesOf(DirectionModel) {
+    return direction_models;
+}
+
+std::unexpected<Error> bad(const std::string& source, const std::string& text) {
+    return fail(ErrorCode::BadInput, fmt::format("{}: {}", source, text));
+}
+
+template <class Choice>
+Expected<void> choose(const Setting& setting, Choice& target, const json& value, const std::string& source) {
+    const auto& names = namesOf(Choice{});
+    const auto name = value.is_string() ? std::ranges::find(names, value.get<std::string>()) : names.end();
+    if (name == names.end())
+        return bad(source, fmt::format("'{}' must be one of \"{}\"", setting.key, fmt::join(names, "\", \"")));
+    target = static_cast<Choice>(name - names.begin());
+    return {};
+}
+
+Expected<void> assignNumber(const Setting& setting, const json& value, const std::string& source) {
+    if (!value.is_number()) return bad(source, fmt::format("'{}' must be a number", setting.key));
+    const double number = value.get<double>();
+    if (!(number >= setting.least && number <= setting.most))
+        return bad(source,
+                   fmt::format("'{}' is {}, outside {} .. {}", setting.key, number, setting.least, setting.most));
+    const bool whole = !std::holds_alternative<float*>(setting.target);
+    if (whole && number != std::floor(number))
+        return bad(source, fmt::format("'{}' is {}, it must be a whole number", setting.key, number));
+    std::visit(
+        [&](auto* target) {
+            if constexpr (std::is_arithmetic_v<std::remove_pointer_t<decltype(target)>>)
+                *target = static_cast<std::remove_pointer_t<decltype(target)>>(number);
+        },
+        setting.target);
+    return {};
+}
+
+Expected<void> assign(const Setting& setting, const json& value, const std::string& source) {
+    if (const auto* format = std::get_if<ColorFormat*>(&setting.target))
+        return choose(setting, **format, value, source);
+    if (const auto* model = std::get_if<DirectionModel*>(&setting.target))
+        return choose(setting, **model, value, source);
+    return assignNumber(setting, value, source);
+}
+
+// "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
+std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
+    const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
+    if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
+    std::vector<std::string_view> known = {"extends", "description"};
+    for (const Setting& s : settings) known.push_back(s.key);
+    if (const std::string_view nearest = nearestName(key, known); !nearest.empty())
+        return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
+    return fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", "));
+}
+
+constexpr const char* threshold_what =
+    "where a light set's record is kept: this share (0..1) of the mean bounced light of the surfaces that the set "
+    "lights "
+    "directly. Higher saves memory and update time and loses faint light; 0.01 is hardly seen";
+
+json schemaOf(const Setting& s) {
+    json out = {{"description", s.what}};
+    if (std::holds_alternative<ColorFormat*>(s.target))
+        out["enum"] = color_formats;
+    else if (std::holds_alternative<DirectionModel*>(s.target))
+        out["enum"] = direction_models;
+    else {
+        out["type"] = std::holds_alternative<float*>(s.target) ? "number" : "integer";
+        out["minimum"] = s.least;
+        out["maximum"] = s.most;
+    }
+    return out;
+}
+
+void addBudgets(Profile& p, std::vector<Setting>& list) {
+    constexpr double any = 1e15;
+    list.push_back({"budgets.total", &p.budget_total, 0, any,
+                    "bytes of device memory for everything; 0: no limit. What the platform's memory plan grants"});
+    list.push_back({"budgets.base_lightmaps", &p.budget_base_lightmaps, 0, any,
+                    "bytes of the lightmap pages; 0: no limit. They grow with the square of the texel density"});
+    list.push_back({"budgets.dynamic", &p.budget_dynamic, 0, any,
+                    "bytes of all records of light sets and doors; 0: no limit. They also bound what an update reads"});
+    list.push_back({"budgets.per_element", &p.budget_per_element, 0, any,
+                    "bytes of the records that name one light set or door; 0: no limit. Keeps one lamp that lights the "
+                    "whole level from eating the budget of all others"});
+}
+
+void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list) {
+    const std::string prefix = fmt::format("bake.{}.", name);
+    list.push_back({prefix + "samples_per_texel", &q.samples_per_texel, 1, 64,
+                    "points of a texel that rays start from; more soften what a texel at an edge sees"});
+    list.push_back({prefix + "series_rays", &q.series_rays, 1, 4096,
+                    "rays per texel for the bounces; 4 bytes of memory each while the bake runs"});
+    list.push_back({prefix + "rays", &q.rays, 1, 1 << 20,
+                    "rays per texel and light set at most, in rounds of 32, for what is stored: the bake's time"});
+    list.push_back({prefix + "emitter_samples", &q.emitter_samples, 0, 4096,
+                    "samples per 32 rays towards each light set's emissive surfaces and an image sky"});
+    list.push_back({prefix + "noise", &q.noise, 0, 1,
+                    "rays end once the 95 % interval is within this share (0..1) of the light; 0: never early"});
+    list.push_back({prefix + "denoise", &q.denoise, 0, 1, "1: filter the noise that is left; 0: keep every detail"});
+    list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});
+    list.push_back({prefix + "tolerance", &q.tolerance, 1e-6, 1,
+                    "bounces end when what is still to come is below this share (0..1) of a set's light"});
+}
+
+}  // namespace
+
+const char* nameOf(ColorFormat format) {
+    return color_formats[static_cast<size_t>(format)];
+}
+
+const char* nameOf(DirectionModel model) {
+    return direction_models[static_cast<size_t>(model)];
+}
+
+std::vector<Setting> settingsOf(Profile& p) {
+    std::vector<Setting> list;
+    addBudgets(p, list);
+    list.push_back(
+        {"lightmaps.texels_per_metre", &p.texels_per_metre, 0.01, 256,
+         "density of lightmaps, texels per metre. Memory and bake time grow with its square; shadows of baked "
+         "lights and contacts are as sharp as it"});
+    list.push_back({"lightmaps.page_size", &p.page_size, 64, 4096,
+                    "texels along a page's longest side at most; larger pages waste less and stream worse"});
+    list.push_back({"lightmaps.color", &p.color_format, 0, 0,
+                    "format of irradiance, 4 bytes: e5b9g9r9 is finer, r11g11b10f can be filtered and stored to by "
+                    "devices that lack the other"});
+    list.push_back(
+        {"lightmaps.model", &p.direction_model, 0, 0,
+         "how irradiance falls off over normals: ahd is better where one lamp rules, linear where many mix"});
+    list.push_back({"records.threshold", &p.threshold, 0, 1, threshold_what});
+    for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}})
+        addQuality(name, *q, list);
+    return list;
+}
+
+Expected<void> assignSetting(Profile& profile, const std::string& key, const json& value, const std::string& source) {
+    if (key.starts_with(set_threshold_prefix) && key.size() > set_threshold_prefix.size()) {
+        const std::string set = key.substr(set_threshold_prefix.size());
+        float threshold = 0;
+        if (auto ok = assign({key, &threshold, 0, 1, ""}, value, source); !ok) return ok;
+        profile.set_thresholds[set] = threshold;
+        return {};
+    }
+    const auto settings = settingsOf(profile);
+    const auto it = std::ranges::find(settings, key, &Setting::key);
+    if (it == settings.end()) return bad(source, unknownKey(key, value, settings));
+    return assign(*it, value, source);
+}
+
+Expected<void> assignText(Profile& profile, const std::string& text, const std::string& source,
+                          const std::string& origin) {
+    const size_t equals = text.find('=');
+    if (equals == 0 || equals == std::string::npos)
+        return bad(source, fmt::format("'{}' is not of the form key=value", text));
+    const std::string key = text.substr(0, equals), written = text.substr(equals + 1);
+    json value = json::parse(written, nullptr, false);
+    if (value.is_discarded() || !value.is_primitive()) value = written;
+    if (auto ok = assignSetting(profile, key, value, source); !ok) return ok;
+    profile.origin[key] = origin;
+    return {};
+}
+
+std::string settingsSchema() {
+    using ordered = nlohmann::ordered_json;
+    ordered schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
+                      {"title", "A profile of the cooker"},
+                      {"type", "object"},
+                      {"additionalProperties", false}};
+    ordered& top = schema["properties"];
+    top["$schema"] = {{"type", "string"}};
+    top["description"] = {{"type", "string"}, {"description", "for people"}};
+    top["extends"] = {
+        {"type", "string"},
+        {"description", "what this profile changes: a shipped profile's name or a file beside it; default: desktop"}};
+    Profile profile;
+    for (const Setting& s : settingsOf(profile)) {
+        ordered* object = &schema;
+        size_t begin = 0;
+        for (size_t dot; (dot = s.key.find('.', begin)) != std::string::npos; begin = dot + 1) {
+            object = &(*object)["properties"][s.key.substr(begin, dot - begin)];
+            (*object)["type"] = "object";
+            (*object)["additionalProperties"] = false;
+        }
+        (*object)["properties"][s.key.substr(begin)] = schemaOf(s);
+    }
+    top["records"]["properties"]["thresholds"] = {
+        {"type", "object"},
+        {"description", "records.threshold for single light sets, by name"},
+        {"additionalProperties", {{"type", "number"}, {"minimum", 0}, {"maximum", 1}}}};
+    return schema.dump(4) + "\n";
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,39 @@
+// The list of all settings of a profile: keys, ranges, units and what they are for. Profiles, levels, the command line,
+// packs and the schema all go by it.
+#pragma once
+
+#include <pipeline/profile.h>
+
+#include <nlohmann/json.hpp>
+
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace dimmer::cook {
+
+struct Setting {
+    std::string key;  // dotted: "lightmaps.page_size"
+    std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*> target;
+    double least = 0, most = 0;  // of a number
+    std::string what;            // with its unit, and why one would change it
+};
+
+// Those of `profile`, whose members the targets point into.
+std::vector<Setting> settingsOf(Profile& profile);
+
+// "records.thresholds.NAME" is a setting for every light set.
+inline constexpr std::string_view set_threshold_prefix = "records.thresholds.";
+
+// Sets one. `source` begins error messages: "profile mine.json:3", "--set", "the level's 'dimmer_settings'".
+Expected<void> assignSetting(Profile& profile, const std::string& key, const nlohmann::json& value,
+                             const std::string& source);
+
+// "key=value" as on the command line; numbers and names need no quotes.
+Expected<void> assignText(Profile& profile, const std::string& text, const std::string& source,
+                          const std::string& origin);
+
+// The JSON schema of profiles (draft 2020-12): profiles/schema.json.
+std::string settingsSchema();
+
+}  // namespace dimmer::cook

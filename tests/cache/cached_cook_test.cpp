@@ -1,0 +1,218 @@
+// Cooks with a cache: the same bytes as without, and only what changed is made again.
+#include <gmock/gmock.h>
+#include <pipeline/small_level.h>
+
+#include <fstream>
+#include <set>
+#include <thread>
+
+namespace dimmer::cook::test {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
+
+constexpr const char* quick_profile = R"({"bake": {"draft":
+    {"samples_per_texel": 2, "series_rays": 8, "rays": 128, "emitter_samples": 2, "noise": 0.2, "bounces": 8}}})";
+
+// Two rooms with a door between, lamps of three sets, one of them red and partly emissive: everything that terms can
+// depend on.
+LevelFile houseOfTwo() {
+    LevelFile level = twoCells();
+    const int white = addWhite(level), glow = addWhite(level, {{"emissiveFactor", {1, 0.5, 0.1}}});
+    level.addNode({{"name", "panel"},
+                   {"mesh", level.addSquareMesh(glow)},
+                   {"translation", {1, 1, 0.2}},
+                   {"scale", {0.3, 0.3, 0.3}},
+                   {"extras", {{"dimmer_light_set", "one"}}}});
+    level.addNode({{"name", "leaf"},
+                   {"mesh", addRoomMesh(level, {0.9f, 0.2f, 1.2f}, 0.6f, white)},
+                   {"extras", {{"dimmer_door", "flap"}}}});
+    level.document["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = {1, 0.2, 0.1};
+    return level;
+}
+
+json& lamp(LevelFile& level, size_t index) {
+    return level.document["extensions"]["KHR_lights_punctual"]["lights"][index];
+}
+
+struct CachedCook : testing::Test {
+    const TemporaryFolder folder;
+    std::string profile = writeText(folder, "quick.json", quick_profile).string();
+
+    CookResult run(const LevelFile& level, bool with_cache, const std::string& pack = "level.dimmer") {
+        SilentProgress silent;
+        CookOptions options{
+            .level = writeLevel(folder, level), .pack = folder.path / pack, .profile = profile, .quality = "draft"};
+        if (with_cache) options.cache = folder.path / "cache";
+        auto result = cook(options, silent);
+        EXPECT_TRUE(result.has_value()) << result.error().message;
+        return result ? std::move(*result) : CookResult{};
+    }
+    std::string bytes(const std::string& pack) const {
+        std::ifstream file(folder.path / pack, std::ios::binary);
+        return {std::istreambuf_iterator<char>(file), {}};
+    }
+    // Cooks with the cache and without; expects the same bytes; the stages that were made.
+    std::vector<std::string> made(const LevelFile& level) {
+        const CookResult result = run(level, true);
+        run(level, false, "uncached.dimmer");
+        EXPECT_GT(bytes("level.dimmer").size(), 1000u);
+        EXPECT_TRUE(bytes("level.dimmer") == bytes("uncached.dimmer"));
+        std::vector<std::string> stages;
+        for (const CacheLine& line : result.stats.cache)
+            if (!line.reused) stages.push_back(line.what);
+        return stages;
+    }
+    std::string why(const LevelFile& level, const std::string& what) {
+        for (const CacheLine& line : run(level, true).stats.cache)
+            if (line.what == what) return line.why;
+        return "no such stage";
+    }
+};
+
+TEST_F(CachedCook, NothingChangedNothingMade) {
+    const LevelFile level = houseOfTwo();
+    EXPECT_THAT(made(level), ElementsAre("pack", "charts", "always-on light", "light set 'one'", "light set 'both'",
+                                         "light set 'two'"));
+    EXPECT_THAT(made(level), IsEmpty());
+    const CookResult again = run(level, true);
+    EXPECT_EQ(again.stats.rays, 0u);
+    EXPECT_EQ(again.pack.elements.size(), 4u);  // the result is as full as a cook's
+}
+
+TEST_F(CachedCook, ASetMadeBrighterIsMultiplied) {
+    LevelFile level = houseOfTwo();
+    made(level);
+    // All of "two": its one lamp; then of "one": lamp and panel, by the same factor per channel.
+    lamp(level, 2)["intensity"] = 137.31;
+    lamp(level, 2)["color"] = {0.3, 0.9, 0.7};
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    lamp(level, 0)["intensity"] = 100 * 1.7;
+    for (json& m : level.document["materials"])
+        if (m.contains("emissiveFactor")) m["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = 1.7;
+    level.document["extensionsUsed"].push_back("KHR_materials_emissive_strength");
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+}
+
+TEST_F(CachedCook, AnyOtherEditOfASetMakesThatSet) {
+    LevelFile level = houseOfTwo();
+    made(level);
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "lamp3") node["translation"][0] = 8.7;
+    EXPECT_THAT(made(level), ElementsAre("pack", "light set 'two'"));
+    lamp(level, 1)["intensity"] = 50;  // one of two lamps
+    EXPECT_THAT(made(level), ElementsAre("pack", "light set 'both'"));
+    lamp(level, 0)["intensity"] = 50;  // not the panel
+    EXPECT_THAT(made(level), ElementsAre("pack", "light set 'one'"));
+    level.document["scenes"][0]["extras"]["dimmer_sky_luminance"] = 6;
+    EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
+    EXPECT_THAT(why(level, "pack"), IsEmpty());
+}
+
+TEST_F(CachedCook, ASetMoreOrLessLeavesTheOthers) {
+    LevelFile level = houseOfTwo();
+    made(level);
+    // First in the file, so that every other set's number changes.
+    LevelFile more = level;
+    more.addLight("newcomer", {{"type", "point"}, {"intensity", 70}}, {{"dimmer_light_set", "new"}});
+    json& nodes = more.document["nodes"];
+    json& roots = more.document["scenes"][0]["nodes"];
+    nodes.back()["translation"] = {1.2, 1.6, 0.4};
+    std::rotate(roots.begin(), roots.end() - 1, roots.end());
+    EXPECT_THAT(made(more), ElementsAre("pack", "light set 'new'"));
+    EXPECT_EQ(run(more, true).pack.elements[0].name, "new");
+    EXPECT_THAT(made(level), IsEmpty());
+}
+
+TEST_F(CachedCook, GeometryMakesEverything) {
+    LevelFile level = houseOfTwo();
+    made(level);
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "cell2") node["translation"] = {0, 0, 0.1};
+    EXPECT_THAT(made(level), testing::SizeIs(6));
+    EXPECT_THAT(made(level), IsEmpty());
+    level.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.6, 0.7, 0.7, 1};
+    EXPECT_THAT(made(level), testing::SizeIs(6));
+}
+
+TEST_F(CachedCook, BudgetsAndNamesOfFilesMakeNoLight) {
+    const LevelFile level = houseOfTwo();
+    made(level);
+    const std::string text = std::string(quick_profile);
+    profile = writeText(folder, "budget.json", text.substr(0, text.size() - 1) + R"(, "budgets": {"total": 9000000}})")
+                  .string();
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    profile = writeText(folder, "finer.json", text.substr(0, text.size() - 1) + R"(, "records": {"threshold": 0.02}})")
+                  .string();
+    EXPECT_THAT(made(level),
+                ElementsAre("pack", "always-on light", "light set 'one'", "light set 'both'", "light set 'two'"));
+}
+
+TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
+    const LevelFile level = houseOfTwo();
+    made(level);
+    size_t damaged = 0;
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache")) {
+        std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
+        file.seekp(static_cast<std::streamoff>(entry.file_size() / 2 + 20));
+        file.put('!').put('?');
+        ++damaged;
+    }
+    EXPECT_EQ(damaged, 7u);
+    SilentProgress silent;
+    const CookResult result = run(level, true);
+    for (const CacheLine& line : result.stats.cache) {
+        EXPECT_FALSE(line.reused) << line.what;
+        EXPECT_EQ(line.why, "the entry is damaged") << line.what;
+    }
+    EXPECT_TRUE(bytes("level.dimmer") == bytes("uncached.dimmer"));
+    EXPECT_THAT(made(level), IsEmpty());
+}
+
+TEST_F(CachedCook, SaysWhy) {
+    LevelFile level = houseOfTwo();
+    EXPECT_EQ(why(level, "light set 'two'"), "first cook of this pack here");
+    lamp(level, 1)["intensity"] = 50;
+    EXPECT_EQ(why(level, "light set 'both'"), "lamps of light set 'both' changed");
+    level.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.6, 0.7, 0.7, 1};
+    EXPECT_EQ(why(level, "charts"), "geometry changed");
+    lamp(level, 1)["intensity"] = 51;
+    std::filesystem::remove_all(folder.path / "cache");
+    EXPECT_EQ(why(level, "charts"), "first cook of this pack here");
+}
+
+TEST_F(CachedCook, AFolderThatTakesNothingIsAWarning) {
+    writeText(folder, "cache", "a file where the folder should be");
+    const CookResult result = run(houseOfTwo(), true);
+    EXPECT_THAT(result.stats.warnings, testing::Contains(HasSubstr("cooked without a cache")));
+    EXPECT_GT(bytes("level.dimmer").size(), 1000u);
+}
+
+TEST_F(CachedCook, TwoAtOnce) {
+    const LevelFile level = houseOfTwo();
+    const auto file = writeLevel(folder, level);
+    std::atomic<int> done = 0;
+    std::vector<std::thread> threads;
+    for (const char* name : {"a.dimmer", "b.dimmer", "c.dimmer"})
+        threads.emplace_back([&, name] {
+            SilentProgress silent;
+            done += cook({.level = file,
+                          .pack = folder.path / name,
+                          .profile = profile,
+                          .quality = "draft",
+                          .cache = folder.path / "cache"},
+                         silent)
+                        .has_value();
+        });
+    for (std::thread& t : threads) t.join();
+    EXPECT_EQ(done, 3);
+    EXPECT_TRUE(bytes("a.dimmer") == bytes("b.dimmer"));
+    EXPECT_TRUE(bytes("a.dimmer") == bytes("c.dimmer"));
+    EXPECT_THAT(made(level), IsEmpty());
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

@@ -1,0 +1,149 @@
+// Entries come back as they were kept, or not at all.
+#include <cache/store.h>
+#include <gmock/gmock.h>
+#include <pipeline/small_level.h>
+
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+namespace dimmer::cook::test {
+namespace {
+
+std::vector<std::byte> bytesOf(const std::string& text) {
+    const auto raw = std::as_bytes(std::span(text));
+    return {raw.begin(), raw.end()};
+}
+
+Key keyOf(uint32_t n) {
+    return KeyBuilder("test").add(n).finish();
+}
+
+std::filesystem::path onlyEntry(const std::filesystem::path& folder) {
+    std::vector<std::filesystem::path> files;
+    for (const auto& f : std::filesystem::directory_iterator(folder)) files.push_back(f.path());
+    EXPECT_EQ(files.size(), 1u);
+    return files.empty() ? std::filesystem::path() : files.front();
+}
+
+TEST(CacheStore, FindsWhatItKept) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path / "deep/cache");
+    ASSERT_TRUE(store) << store.error().message;
+    EXPECT_EQ(store->find("light", keyOf(1)).find, Find::Missing);
+    for (const std::string& text : {std::string(), std::string("x"), std::string(100000, 'a')}) {
+        ASSERT_TRUE(store->keep("light", keyOf(1), bytesOf(text)));
+        const Entry entry = store->find("light", keyOf(1));
+        EXPECT_EQ(entry.find, Find::Hit);
+        EXPECT_EQ(entry.bytes, bytesOf(text));
+    }
+    EXPECT_EQ(store->find("light", keyOf(2)).find, Find::Missing);
+    EXPECT_EQ(store->find("charts", keyOf(1)).find, Find::Missing);
+}
+
+TEST(CacheStore, AnyDamageIsSeen) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    ASSERT_TRUE(store->keep("light", keyOf(1), bytesOf("what a stage found out")));
+    const auto file = onlyEntry(folder.path);
+    std::ifstream in(file, std::ios::binary);
+    const std::string whole(std::istreambuf_iterator<char>(in), {});
+    const auto rewrite = [&](const std::string& bytes) {
+        std::ofstream(file, std::ios::binary) << bytes;
+        return store->find("light", keyOf(1)).find;
+    };
+    for (size_t i = 0; i < whole.size(); ++i) {
+        std::string flipped = whole;
+        flipped[i] = static_cast<char>(flipped[i] ^ 1);
+        EXPECT_EQ(rewrite(flipped), Find::Damaged) << "byte " << i;
+        EXPECT_EQ(rewrite(whole.substr(0, i)), Find::Damaged) << "cut at " << i;
+    }
+    EXPECT_EQ(rewrite(whole + "x"), Find::Damaged);
+    EXPECT_EQ(rewrite(whole), Find::Hit);
+}
+
+TEST(CacheStore, TheLeastRecentlyUsedGoFirst) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    std::string noise;  // that zstd cannot make smaller
+    for (uint32_t i = 0; i < 25000; ++i) noise += keyOf(i).hex()[0];
+    const auto now = std::filesystem::file_time_type::clock::now();
+    for (uint32_t i = 0; i < 4; ++i) {
+        ASSERT_TRUE(store->keep("light", keyOf(i), bytesOf(noise)));
+        for (const auto& f : std::filesystem::directory_iterator(folder.path))
+            if (f.path().string().contains(keyOf(i).hex()))
+                std::filesystem::last_write_time(f.path(), now - std::chrono::hours(4 - i));
+    }
+    const uint64_t all = store->trim(UINT64_MAX), one = all / 4;
+    EXPECT_EQ(store->find("light", keyOf(0)).find, Find::Hit);  // the oldest is used: it is the youngest now
+    EXPECT_EQ(store->trim(all), all);
+    EXPECT_EQ(store->trim(2 * one), 2 * one);
+    EXPECT_EQ(store->find("light", keyOf(0)).find, Find::Hit);
+    EXPECT_EQ(store->find("light", keyOf(1)).find, Find::Missing);
+    EXPECT_EQ(store->find("light", keyOf(2)).find, Find::Missing);
+    EXPECT_EQ(store->find("light", keyOf(3)).find, Find::Hit);
+    EXPECT_EQ(store->trim(0), 0u);
+}
+
+// What a killed cook leaves goes after a day; what may belong to a running one, and what is not ours, stays.
+TEST(CacheStore, AbandonedFilesGo) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    const auto now = std::filesystem::file_time_type::clock::now();
+    const auto fresh = writeText(folder, "light-1.entry.abcdef", "half"),
+               old = writeText(folder, "light-2.entry.x", "half"), other = writeText(folder, "notes.txt", "mine");
+    std::filesystem::last_write_time(old, now - std::chrono::hours(48));
+    std::filesystem::last_write_time(other, now - std::chrono::hours(48));
+    store->trim(0);
+    EXPECT_TRUE(std::filesystem::exists(fresh));
+    EXPECT_FALSE(std::filesystem::exists(old));
+    EXPECT_TRUE(std::filesystem::exists(other));
+}
+
+TEST(CacheStore, AFolderThatCannotBeMade) {
+    const TemporaryFolder folder;
+    writeText(folder, "file", "no folder");
+    const auto store = CacheStore::open(folder.path / "file");
+    ASSERT_FALSE(store.has_value());
+    EXPECT_THAT(store.error().message, testing::HasSubstr("file"));
+}
+
+TEST(CacheStore, ManyAtOnce) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    const auto content = [](uint32_t key) { return bytesOf(std::string(2000 + key, static_cast<char>('a' + key))); };
+    std::atomic<int> wrong = 0;
+    std::vector<std::thread> threads;
+    for (uint32_t t = 0; t < 4; ++t)
+        threads.emplace_back([&, t] {
+            for (uint32_t i = 0; i < 200; ++i) {
+                const uint32_t key = (i * 7 + t) % 5;
+                const Entry entry = store->find("light", keyOf(key));
+                // Whole or not there; a trim of another thread may have removed it.
+                if (entry.find == Find::Damaged || (entry.find == Find::Hit && entry.bytes != content(key))) ++wrong;
+                if (entry.find != Find::Hit && !store->keep("light", keyOf(key), content(key))) ++wrong;
+                if (i % 50 == 49) store->trim(100);
+            }
+        });
+    for (std::thread& t : threads) t.join();
+    EXPECT_EQ(wrong, 0);
+}
+
+TEST(CacheKey, PartsDoNotRunTogether) {
+    const auto key = [](const char* a, const char* b) {
+        return KeyBuilder("test").add(std::string_view(a)).add(std::string_view(b)).finish();
+    };
+    EXPECT_EQ(key("ab", "c"), key("ab", "c"));
+    EXPECT_NE(key("ab", "c"), key("a", "bc"));
+    EXPECT_NE(KeyBuilder("a").finish(), KeyBuilder("b").finish());
+    // Another code, another key.
+    EXPECT_NE(KeyBuilder("a").finish(), KeyBuilder::ofAnyCode("a").finish());
+    EXPECT_EQ(codeStamp().size(), 40u);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
