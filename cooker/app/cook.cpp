@@ -48,36 +48,24 @@ nlohmann::ordered_json cacheJson(const CookStats& stats) {
     return list;
 }
 
-std::string share(uint64_t bytes, uint64_t budget) {
-    return budget == 0
-               ? ""
-               : fmt::format("{:5.1f} % of {}", 100.0 * static_cast<double>(bytes) / static_cast<double>(budget),
-                             humanBytes(budget));
+void printTable(const CookResult& result, const PackCost& cost) {
+    const PackData& pack = result.pack;
+    fmt::print("{}", budgetTable(pack, cost, result.profile));
+    fmt::print("\nfile: {}; pages: {} of {} x {} texels, {} clusters, {} batches, {} bounces, {:.1f} M rays, peak {}\n",
+               humanBytes(result.file_bytes), pack.page_count, pack.page_width, pack.page_height, pack.clusters.size(),
+               pack.batches.size(), result.stats.bounces, static_cast<double>(result.stats.rays) / 1e6,
+               humanBytes(result.stats.peak_bytes));
+    for (const Remedy& remedy : result.fitted) fmt::print("fitted: {}\n", remedy.text());
 }
 
-void printTable(const CookResult& result, const PackCost& cost, const Profile& profile) {
-    const PackData& pack = result.pack;
-    fmt::print("{:<26} {:>12}  {}\n", "category", "bytes", "share of the budget");
-    auto row = [](std::string_view name, uint64_t bytes, uint64_t budget) {
-        fmt::print("{:<26} {:>12}  {}\n", name, humanBytes(bytes), share(bytes, budget));
-    };
-    row("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
-    row("dynamic records", cost.dynamic, profile.budget_dynamic);
-    row("ancillary", cost.ancillary, 0);
-    row("total on the device", cost.device(), profile.budget_total);
-    row("the file", result.file_bytes, 0);
-    fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "element", "bytes", "receivers", "energy dropped");
-    for (const ElementCost& e : cost.elements) {
-        float dropped = 0;
-        for (const Contribution& c : pack.contributions)
-            if (c.light_set == e.element && c.doors_open.empty() && c.doors_closed.empty()) dropped = c.energy_dropped;
-        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n",
-                   (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
-                   humanBytes(e.bytes), e.receivers, 100 * static_cast<double>(dropped));
+nlohmann::ordered_json fittedJson(const CookResult& result) {
+    auto list = nlohmann::ordered_json::array();
+    for (const Remedy& remedy : result.fitted) {
+        nlohmann::ordered_json changes;
+        for (const Change& c : remedy.changes) changes[c.key] = c.to;
+        list.push_back({{"changes", changes}, {"saves", remedy.saves}, {"error", remedy.error}});
     }
-    fmt::print("\npages: {} of {} x {} texels, {} clusters, {} batches, {} bounces, {:.1f} M rays, peak {}\n",
-               pack.page_count, pack.page_width, pack.page_height, pack.clusters.size(), pack.batches.size(),
-               result.stats.bounces, static_cast<double>(result.stats.rays) / 1e6, humanBytes(result.stats.peak_bytes));
+    return list;
 }
 
 nlohmann::ordered_json suggestions(const CookStats& stats) {
@@ -98,6 +86,7 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     json["file_bytes"] = result.file_bytes;
     json["warnings"] = result.stats.warnings;
     json["cache"] = cacheJson(result.stats);
+    if (!result.fitted.empty()) json["fitted"] = fittedJson(result);
     if (!result.stats.suggested_combinations.empty()) json["dimmer_combinations"] = suggestions(result.stats);
     return json;
 }
@@ -141,7 +130,7 @@ int run(const Arguments& a) {
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
-    if (a.json != "-") printTable(*result, costOf(result->pack), result->profile);
+    if (a.json != "-") printTable(*result, costOf(result->pack));
     if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
@@ -192,6 +181,9 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option("--cache-limit", a->cache_limit_mb,
                   "MiB that the cache may hold; what was used least recently goes first")
         ->capture_default_str();
+    c->add_flag("--fit", a->options.fit,
+                "over budget: raise the thresholds of the sets that lose least, or lower the density, until it fits; "
+                "the table says what was changed and the mean error that it adds");
     c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not");
     c->add_option(
         "--json", a->json,

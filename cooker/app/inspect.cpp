@@ -40,6 +40,19 @@ nlohmann::ordered_json settingsOf(const PackData& d) {
     return settings;
 }
 
+// The budgets that the pack was cooked for; none where it does not say.
+Profile budgetsOf(const PackData& d) {
+    const auto settings = readSettings(d.settings_json);
+    return settings ? settings->profile : Profile{};
+}
+
+nlohmann::ordered_json budgetsJson(const Profile& p) {
+    return {{"total", p.budget_total},
+            {"base_lightmaps", p.budget_base_lightmaps},
+            {"dynamic", p.budget_dynamic},
+            {"per_element", p.budget_per_element}};
+}
+
 nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
     nlohmann::ordered_json j;
     j["format_version"] = format::version;
@@ -73,26 +86,18 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     j["batches"] = d.batches.size();
     j["mixed_batches"] = 0;
     j["overlap_histogram"] = cost.overlap_histogram;
+    j["budgets"] = budgetsJson(budgetsOf(d));
     j["settings"] = settingsOf(d);
     return j;
 }
 
 void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
-    auto row = [](std::string_view name, uint64_t bytes) { fmt::print("{:<26} {:>12}\n", name, humanBytes(bytes)); };
-    row("file", file_bytes);
-    row("device memory", cost.device());
-    row("  base lightmaps", cost.base_lightmap);
-    row("  dynamic records", cost.dynamic);
-    row("  ancillary", cost.ancillary);
-    row("meshes (host)", cost.meshes);
+    fmt::print("{}", budgetTable(d, cost, budgetsOf(d)));
+    fmt::print("\nfile: {}; meshes (host): {}\n", humanBytes(file_bytes), humanBytes(cost.meshes));
     fmt::print(
-        "\npages: {} of {} x {} texels; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n",
+        "pages: {} of {} x {} texels; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n",
         d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
-    fmt::print("\n{:<26} {:>12} {:>12}\n", "element", "receivers", "bytes");
-    for (const ElementCost& e : cost.elements)
-        fmt::print("{:<26} {:>12} {:>12}\n", (isDoor(d, e.element) ? "door:" : "") + d.elements[e.element].name,
-                   e.receivers, humanBytes(e.bytes));
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,

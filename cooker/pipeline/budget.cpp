@@ -20,7 +20,11 @@ std::string largestElements(const PackData& pack, const PackCost& cost) {
     std::ranges::stable_sort(by_size, [](const auto& a, const auto& b) { return a.bytes > b.bytes; });
     std::vector<std::string> names;
     for (size_t i = 0; i < std::min<size_t>(3, by_size.size()); ++i)
-        names.push_back(fmt::format("'{}' {}", pack.elements[by_size[i].element].name, megabytes(by_size[i].bytes)));
+        names.push_back(fmt::format(
+            "{}'{}' {} ({:.0f} % of the records)",
+            pack.elements[by_size[i].element].kind == ElementKind::Door ? "door " : "",
+            pack.elements[by_size[i].element].name, megabytes(by_size[i].bytes),
+            100 * static_cast<double>(by_size[i].bytes) / static_cast<double>(std::max<uint64_t>(cost.dynamic, 1))));
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -67,11 +71,54 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
         check(fmt::format("element '{}'", pack.elements[e.element].name), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
     std::string holders;
-    if (!cost.elements.empty()) holders = "; the largest sets: " + largestElements(pack, cost);
+    if (!cost.elements.empty()) holders = "; the largest elements: " + largestElements(pack, cost);
     return fail(ErrorCode::OverBudget,
-                fmt::format("over budget, nothing was written: {}{}. Lower lightmaps.texels_per_metre, raise "
-                            "records.threshold, or raise the budget",
-                            fmt::join(over, "; "), holders));
+                fmt::format("over budget, nothing was written: {}{}", fmt::join(over, "; "), holders));
+}
+
+namespace {
+
+std::string humanBytes(uint64_t bytes) {
+    if (bytes < 1000) return fmt::format("{} B", bytes);
+    if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
+    return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
+}
+
+std::string share(uint64_t bytes, uint64_t budget) {
+    return budget == 0
+               ? ""
+               : fmt::format("{:5.1f} % of {}", 100.0 * static_cast<double>(bytes) / static_cast<double>(budget),
+                             humanBytes(budget));
+}
+
+// Of a light set; a door's light is that of all groups that need it.
+std::string energyDropped(const PackData& pack, uint32_t element) {
+    for (const Contribution& c : pack.contributions)
+        if (c.light_set == element && c.doors_open.empty() && c.doors_closed.empty())
+            return fmt::format("{:.2f} %", 100 * static_cast<double>(c.energy_dropped));
+    return "";
+}
+
+}  // namespace
+
+std::string budgetTable(const PackData& pack, const PackCost& cost, const Profile& budgets) {
+    std::string table = fmt::format("{:<26} {:>12}  {}\n", "category", "bytes", "share of the budget");
+    const auto row = [&](std::string_view name, uint64_t bytes, uint64_t budget) {
+        table += fmt::format("{:<26} {:>12}  {}\n", name, humanBytes(bytes), share(bytes, budget));
+    };
+    row("base lightmaps", cost.base_lightmap, budgets.budget_base_lightmaps);
+    row("dynamic records", cost.dynamic, budgets.budget_dynamic);
+    row("ancillary", cost.ancillary, 0);
+    row("total on the device", cost.device(), budgets.budget_total);
+    table += fmt::format("\n{:<26} {:>12} {:>12} {:>15}  {}\n", "element", "bytes", "receivers", "energy dropped",
+                         "share of the budget");
+    for (const ElementCost& e : cost.elements)
+        table += fmt::format(
+            "{:<26} {:>12} {:>12} {:>15}  {}\n",
+            (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
+            humanBytes(e.bytes), e.receivers, energyDropped(pack, e.element),
+            share(e.bytes, budgets.budget_per_element));
+    return table;
 }
 
 }  // namespace dimmer::cook

@@ -5,6 +5,7 @@
 #include <pipeline/profile.h>
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace dimmer::cook {
@@ -26,6 +27,10 @@ struct PackCost {
 };
 
 PackCost costOf(const PackData& pack);
+
+// Per category and per element: bytes, share of the budget, receivers, energy dropped. Of the profile, its budgets
+// count.
+std::string budgetTable(const PackData& pack, const PackCost& cost, const Profile& budgets);
 
 // An error of ErrorCode::OverBudget that says what is over, by how much, and who holds the most.
 Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Profile& profile);

@@ -29,6 +29,9 @@
 namespace dimmer::cook {
 namespace {
 
+// The cheapest ways out of a budget that a message names.
+constexpr int remedies_named = 3;
+
 class Stopwatch {
    public:
     Stopwatch(CookStats& stats, std::string stage) : stats_(stats), stage_(std::move(stage)) {}
@@ -235,7 +238,7 @@ Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::
 }
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
-                             CookStats& stats, CookCache* cache) {
+                             CookStats& stats, CookCache* cache, LossTable* losses) {
     const Quality* quality = profile.quality(quality_name);
     if (!quality)
         return fail(ErrorCode::InvalidArgument,
@@ -264,6 +267,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         const BakeSettings settings = bakeSettings(profile, *quality, scene);
         baked = bakeWithCache(level, settings, scales, progress, cache);
         multiplyByScales(scales, baked);
+        if (losses) *losses = LossTable(baked, texels, settings.group_thresholds);
     }
     stats.rays = baked.rays;
     stats.bounces = baked.bounces;
@@ -328,23 +332,52 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
     return std::move(entry.pack);
 }
 
-Expected<std::vector<std::byte>> makePack(Scene scene, const Profile& profile, const std::string& quality,
-                                          Progress& progress, CookCache* cache, CookResult& result) {
-    auto pack = cookScene(std::move(scene), profile, quality, progress, result.stats, cache);
+// Each round of `--fit` cooks anew: more than a few mean that something does not follow its prediction.
+constexpr int fit_rounds_max = 6;
+
+// Cooks, and with `fit` changes result.profile and cooks again until the pack is within its budgets.
+Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
+                              CookCache* cache, CookResult& result) {
+    const std::vector<std::string> import_warnings = result.stats.warnings;
+    for (int round = 0;; ++round) {
+        result.stats.warnings = import_warnings;
+        result.stats.suggested_combinations.clear();
+        LossTable losses;
+        auto pack = cookScene(scene, result.profile, quality, progress, result.stats, cache, &losses);
+        if (!pack) return pack;
+        const PackCost cost = costOf(*pack);
+        const auto within = checkBudgets(*pack, cost, result.profile);
+        if (within) return pack;
+        if (!fit || round + 1 == fit_rounds_max) {
+            std::string ways;
+            for (const Remedy& remedy : remedies(*pack, cost, result.profile, losses))
+                if (std::ranges::count(ways, '\n') < remedies_named) ways += "\n  " + remedy.text();
+            return fail(ErrorCode::OverBudget, within.error().message + "; what would help:" + ways);
+        }
+        Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses);
+        for (const Change& c : remedy.changes)
+            if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
+                return std::unexpected(ok.error());
+        result.fitted.push_back(std::move(remedy));
+    }
+}
+
+Expected<std::vector<std::byte>> makePack(const Scene& scene, const CookOptions& options, Progress& progress,
+                                          CookCache* cache, CookResult& result) {
+    auto pack = cookWithin(scene, options.quality, options.fit, progress, cache, result);
     if (!pack) return std::unexpected(pack.error());
     result.pack = std::move(*pack);
-    if (auto ok = checkBudgets(result.pack, costOf(result.pack), profile); !ok) return std::unexpected(ok.error());
     Stopwatch watch(result.stats, "write");
     return packBytes(result.pack);
 }
 
-// From the cache or anew.
-Expected<std::vector<std::byte>> findOrMakePack(Scene scene, const Profile& profile, const std::string& quality,
-                                                Progress& progress, CookCache* cache, CookResult& result) {
-    if (!cache) return makePack(std::move(scene), profile, quality, progress, nullptr, result);
-    const Key key = packKey(scene, profile, quality, *cache);
+// From the cache or anew. Fitted packs are made anew from what the cache has of their parts.
+Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOptions& options, Progress& progress,
+                                                CookCache* cache, CookResult& result) {
+    if (!cache || options.fit) return makePack(scene, options, progress, cache, result);
+    const Key key = packKey(scene, result.profile, options.quality, *cache);
     if (auto entry = cache->findPack(key)) return takePack(std::move(*entry), result);
-    auto bytes = makePack(std::move(scene), profile, quality, progress, cache, result);
+    auto bytes = makePack(scene, options, progress, cache, result);
     if (bytes)
         cache->keepPack(key,
                         {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations});
@@ -373,8 +406,7 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     if (auto ok = resolveSettings(*profile, *scene, options.set); !ok) return std::unexpected(ok.error());
     result.profile = *profile;
     auto cache = openCache(options, result.stats);
-    const auto bytes =
-        findOrMakePack(std::move(*scene), *profile, options.quality, progress, cache ? &*cache : nullptr, result);
+    const auto bytes = findOrMakePack(*scene, options, progress, cache ? &*cache : nullptr, result);
     if (cache) {
         cache->finish(options.cache_bytes_max);
         result.stats.cache = cache->lines();

@@ -4,6 +4,7 @@
 #include <bake/bake.h>
 #include <pack/pack_data.h>
 #include <pipeline/cook_cache.h>
+#include <pipeline/fit.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
 
@@ -25,6 +26,7 @@ struct CookOptions {
     bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
+    bool fit = false;  // over budget: change settings until it fits; see CookResult::fitted
 };
 
 struct CookStats {
@@ -39,9 +41,9 @@ struct CookStats {
 };
 
 // Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data, whatever the
-// cache has.
+// cache has. `losses`: takes what raising thresholds would do.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
-                             CookStats& stats, CookCache* cache = nullptr);
+                             CookStats& stats, CookCache* cache = nullptr, LossTable* losses = nullptr);
 
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
 
@@ -51,7 +53,8 @@ Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::
 
 struct CookResult {
     PackData pack;
-    Profile profile;  // as resolved
+    Profile profile;             // as resolved, and fitted
+    std::vector<Remedy> fitted;  // what had to be changed, in the order of the cooks that it took
     uint64_t file_bytes = 0;
     CookStats stats;
 };

@@ -1,0 +1,35 @@
+// What to change so that a pack fits its budgets, and what that costs.
+#pragma once
+
+#include <pipeline/budget.h>
+#include <pipeline/losses.h>
+
+#include <string>
+#include <vector>
+
+namespace dimmer::cook {
+
+// A setting to change.
+struct Change {
+    std::string key;
+    float from = 0, to = 0;
+};
+
+struct Remedy {
+    std::vector<Change> changes;
+    bool fits = false;
+    uint64_t saves = 0;  // bytes of device memory
+    double error = 0;    // mean relative error that it adds, all sets at weight 1; see LossTable
+    double energy = 0;   // of the set that loses most, the share of its stored light
+    std::string text() const;
+};
+
+// For a pack that is over a budget: raising thresholds where the least light goes for the bytes, raising all of them,
+// raising that of the set with the most records, lowering the density. Those that fit first, then by error.
+std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
+                             const LossTable& losses);
+
+// What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do.
+Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,72 @@
+// A cook that is killed at any moment, with nothing to say in the matter.
+#include <app/tool_fixture.h>
+#include <dimmer/pack.h>
+
+#include <chrono>
+#include <csignal>
+#include <random>
+
+namespace dimmer::test {
+namespace {
+
+using Kill = ToolTest;
+
+// SIGKILL at 50 moments spread over a whole cook, its cache shared by all of them: the old pack stays or the new one is
+// whole, and a cook afterwards gives the bytes of an undisturbed one.
+TEST_F(Kill, AtAnyMomentLeavesAWholePackAndAUsableCache) {
+    using Clock = std::chrono::steady_clock;
+    const std::string fresh = [&] {
+        cook("fresh.dimmer", {"--no-cache"});
+        return readText(file("fresh.dimmer"));
+    }();
+    const auto begin = Clock::now();
+    cook("timed.dimmer", {"--cache", file("timed_cache")});
+    const auto whole = Clock::now() - begin;
+    std::mt19937 random(7);
+    int killed = 0, cooked_whole = 0;
+    for (int i = 0; i < 50; ++i) {
+        const std::string old = i % 2 ? "the old pack" : fresh;
+        write("kept.dimmer", old);
+        if (i % 10 == 0) std::filesystem::remove_all(file("kill_cache"));
+        const auto moment = whole * (random() % 1000) / 1000;
+        const auto started = Clock::now();
+        const auto result =
+            runInterrupted(DIMMER_TOOL,
+                           {"cook", file("level.gltf"), "-o", file("kept.dimmer"), "--profile", file("quick.json"),
+                            "--quality", "draft", "--cache", file("kill_cache")},
+                           SIGKILL, [&](const std::string&) { return Clock::now() - started > moment; });
+        killed += result.exit_code == 128 + SIGKILL;
+        const std::string now = readText(file("kept.dimmer"));
+        EXPECT_TRUE(now == old || now == fresh) << "at " << i;
+        cooked_whole += now == fresh && old != fresh;
+        if (i % 10 != 9) continue;
+        ASSERT_EQ(cook("after.dimmer", {"--cache", file("kill_cache")}).exit_code, 0);
+        EXPECT_TRUE(readText(file("after.dimmer")) == fresh) << "after " << i;
+    }
+    EXPECT_GT(killed, 10);
+    printf("%d of 50 cooks were killed; %d ended before it\n", killed, cooked_whole);
+}
+
+TEST_F(Kill, AFullDiskAndAReadOnlyFolderAreSaid) {
+    write("kept.dimmer", "the old pack");
+    // No file of this process and its children may grow past 512 bytes: a disk as good as full.
+    const std::string command = std::string("ulimit -f 1; trap '' XFSZ; '") + DIMMER_TOOL + "' cook '" +
+                                file("level.gltf") + "' -o '" + file("kept.dimmer") + "' --profile '" +
+                                file("quick.json") + "' --quality draft --cache '" + file("full_cache") + "'";
+    const auto result = runProcess("/bin/sh", {"-c", command});
+    EXPECT_EQ(result.exit_code, 2) << result.err;
+    EXPECT_THAT(result.err, testing::HasSubstr("kept.dimmer"));
+    EXPECT_THAT(result.err, testing::HasSubstr("nothing was changed"));
+    EXPECT_EQ(readText(file("kept.dimmer")), "the old pack");
+    // Even root makes no files there.
+    const auto nowhere = cook("level2.dimmer", {"--cache", "/proc/cache"});
+    EXPECT_EQ(nowhere.exit_code, 0);
+    EXPECT_THAT(nowhere.err, testing::HasSubstr("warning: cooked without a cache: /proc/cache"));
+    const auto read_only = runDimmer({"cook", file("level.gltf"), "-o", "/proc/level.dimmer", "--profile",
+                                      file("quick.json"), "--quality", "draft", "--no-cache"});
+    EXPECT_EQ(read_only.exit_code, 2);
+    EXPECT_THAT(read_only.err, testing::HasSubstr("/proc/level.dimmer"));
+}
+
+}  // namespace
+}  // namespace dimmer::test

@@ -1,0 +1,192 @@
+// What it takes to fit a budget: predictions against what really happens.
+#include <fmt/format.h>
+#include <format/texel.h>
+#include <gmock/gmock.h>
+#include <pipeline/fit.h>
+#include <pipeline/small_level.h>
+
+#include <fstream>
+
+namespace dimmer::cook::test {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* quick_bake = R"("bake": {"draft":
+    {"samples_per_texel": 2, "series_rays": 32, "rays": 128, "emitter_samples": 2, "bounces": 8}})";
+
+// A long corridor with a lamp of its own set every 6 m: light that fades to nothing, so that thresholds matter.
+LevelFile corridor() {
+    LevelFile level;
+    const int white = addWhite(level);
+    level.addNode({{"name", "hall"}, {"mesh", addRoomMesh(level, {0, 0, 0}, 4, white)}, {"scale", {6, 0.7, 0.7}}});
+    for (int i = 0; i < 4; ++i) {
+        const int lamp = level.addLight("lamp" + std::to_string(i), {{"type", "point"}, {"intensity", 50 + 20 * i}},
+                                        {{"dimmer_light_set", "set" + std::to_string(i)}});
+        level.node(lamp)["translation"] = {3 + 6 * i, 2.2, 1.2};
+    }
+    return level;
+}
+
+struct Fit : testing::Test {
+    const TemporaryFolder folder;
+    std::filesystem::path level = writeLevel(folder, corridor());
+
+    Expected<CookResult> run(const std::string& budgets, bool fit, const std::vector<std::string>& set = {},
+                             const std::string& pack = "level.dimmer") {
+        const auto profile = writeText(folder, "mine.json", "{" + budgets + quick_bake + "}");
+        SilentProgress silent;
+        CookOptions options{
+            .level = level, .pack = folder.path / pack, .profile = profile.string(), .quality = "draft", .set = set};
+        options.cache = folder.path / "cache";
+        options.fit = fit;
+        return cook(options, silent);
+    }
+};
+
+// Every texel's light with all sets at 1 and all doors open or all closed, in lux.
+std::vector<double> allOn(const PackData& pack, bool open) {
+    const auto lux = [&](const TexelRecord& record) {
+        const auto c = decodeColor(pack.color_format, record.irradiance);
+        return (0.2126 * static_cast<double>(c[0]) + 0.7152 * static_cast<double>(c[1]) +
+                0.0722 * static_cast<double>(c[2])) /
+               static_cast<double>(pack.exposure);
+    };
+    std::vector<double> out;
+    for (const TexelRecord& base : pack.base_pages) out.push_back(lux(base));
+    for (const Cluster& c : pack.clusters)
+        for (uint32_t i = 0; i < c.receiver_count; ++i) {
+            const uint32_t a = pack.addresses[c.first_receiver + i];
+            const size_t texel =
+                (size_t{TexelAddress::page(a)} * pack.page_height + TexelAddress::y(a)) * pack.page_width +
+                TexelAddress::x(a);
+            for (uint32_t t = 0; t < c.term_count; ++t) {
+                const ClusterTerm& term = pack.terms[c.first_term + t];
+                const Contribution& k = pack.contributions[term.contribution];
+                if (open ? k.doors_closed.empty() : k.doors_open.empty())
+                    out[texel] += lux(pack.payload[term.first_record + i]);
+            }
+        }
+    return out;
+}
+
+// |a - b| over b and 1 % of b's mean, on average over the texels that have light.
+double meanError(const std::vector<double>& a, const std::vector<double>& b) {
+    double mean = 0, sum = 0, lit = 0;
+    for (const double lux : b) {
+        mean += lux;
+        lit += lux > 0;
+    }
+    const double floor = 0.01 * mean / lit;
+    for (size_t i = 0; i < a.size(); ++i)
+        if (b[i] > 0) sum += std::abs(a[i] - b[i]) / (b[i] + floor);
+    return sum / lit;
+}
+
+TEST_F(Fit, HalfOfTheHousesRecordsWithTheErrorThatWasPredicted) {
+    level = std::filesystem::path(DIMMER_SOURCE_DIR) / "game_sample/levels/house.gltf";
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value()) << whole.error().message;
+    const uint64_t budget = costOf(whole->pack).dynamic / 2;
+    const auto fitted = run(fmt::format(R"("budgets": {{"dynamic": {}}}, )", budget), true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    EXPECT_LE(costOf(fitted->pack).dynamic, budget);
+    ASSERT_EQ(fitted->fitted.size(), 1u);
+    const Remedy& remedy = fitted->fitted[0];
+    EXPECT_TRUE(remedy.changes.at(0).key.starts_with("records.thresholds."));
+    // Bytes are counted exactly, but for values that rounding puts on the threshold itself.
+    const auto saved = static_cast<double>(costOf(whole->pack).dynamic - costOf(fitted->pack).dynamic);
+    EXPECT_NEAR(static_cast<double>(remedy.saves), saved, 0.002 * saved);
+    const double error = (meanError(allOn(fitted->pack, false), allOn(whole->pack, false)) +
+                          meanError(allOn(fitted->pack, true), allOn(whole->pack, true))) /
+                         2;
+    printf("fit: predicted %.2f %%, measured %.2f %%\n", 100 * remedy.error, 100 * error);
+    EXPECT_GT(error, remedy.error / 1.5);
+    EXPECT_LT(error, remedy.error * 1.5);
+}
+
+// What `--fit` did can be asked for by hand, and the pack says so.
+TEST_F(Fit, IsWhatItsSettingsCook) {
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value());
+    const std::string budgets = fmt::format(R"("budgets": {{"dynamic": {}}}, )", costOf(whole->pack).dynamic * 2 / 3);
+    const auto fitted = run(budgets, true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    std::vector<std::string> set;
+    for (const Change& c : fitted->fitted.at(0).changes) set.push_back(fmt::format("{}={}", c.key, c.to));
+    const auto by_hand = run(budgets, false, set, "by_hand.dimmer");
+    ASSERT_TRUE(by_hand.has_value()) << by_hand.error().message;
+    EXPECT_EQ(by_hand->pack.payload, fitted->pack.payload);
+    EXPECT_EQ(by_hand->pack.base_pages, fitted->pack.base_pages);
+    const json settings = json::parse(fitted->pack.settings_json);
+    EXPECT_EQ(settings[fitted->fitted[0].changes[0].key]["from"], "fit");
+}
+
+TEST_F(Fit, DensityWhereThePagesAreTooLarge) {
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value());
+    const uint64_t budget = costOf(whole->pack).base_lightmap / 2;
+    const auto fitted = run(fmt::format(R"("budgets": {{"base_lightmaps": {}}}, )", budget), true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    EXPECT_LE(costOf(fitted->pack).base_lightmap, budget);
+    EXPECT_EQ(fitted->fitted.at(0).changes.at(0).key, "lightmaps.texels_per_metre");
+    EXPECT_LT(fitted->profile.texels_per_metre, whole->profile.texels_per_metre);
+    // Not thrown away: half of the texels were asked for, and a third at least are there.
+    EXPECT_GT(costOf(fitted->pack).base_lightmap, costOf(whole->pack).base_lightmap / 3);
+}
+
+TEST_F(Fit, OneElement) {
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value());
+    const PackCost before = costOf(whole->pack);
+    const uint64_t budget = std::ranges::max_element(before.elements, {}, &ElementCost::bytes)->bytes * 9 / 10;
+    const auto fitted = run(fmt::format(R"("budgets": {{"per_element": {}}}, )", budget), true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    const PackCost after = costOf(fitted->pack);
+    for (size_t e = 0; e < before.elements.size(); ++e) {
+        EXPECT_LE(after.elements[e].bytes, budget);
+        if (before.elements[e].bytes <= budget) {
+            EXPECT_EQ(after.elements[e].bytes, before.elements[e].bytes) << e;
+        }
+    }
+}
+
+// Three ways out, each with what it saves and loses; taken by hand, they do what they say.
+TEST_F(Fit, TheMessageNamesRemediesThatHold) {
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value());
+    const PackCost before = costOf(whole->pack);
+    const std::string budgets = fmt::format(R"("budgets": {{"dynamic": {}}}, )", before.dynamic * 3 / 4);
+    const auto over = run(budgets, false);
+    ASSERT_FALSE(over.has_value());
+    EXPECT_EQ(over.error().code, ErrorCode::OverBudget);
+    const std::string& message = over.error().message;
+    EXPECT_EQ(std::ranges::count(message, '\n'), 3);
+    EXPECT_THAT(message, HasSubstr("mean error of"));
+    // "  KEY A -> B[, KEY A -> B]: saves X MB, ..."
+    std::istringstream lines(message);
+    std::string line;
+    std::getline(lines, line);
+    size_t thresholds = 0;
+    while (std::getline(lines, line)) {
+        if (line.contains("texels_per_metre") || line.contains(" more")) continue;
+        std::vector<std::string> set;
+        std::istringstream parts(line.substr(0, line.find(": saves")));
+        for (std::string part; std::getline(parts, part, ',');) {
+            std::istringstream words(part);
+            std::string key, from, arrow, to;
+            words >> key >> from >> arrow >> to;
+            set.push_back(key + "=" + to);
+        }
+        const double said = std::stod(line.substr(line.find(": saves ") + 8));
+        const auto taken = run("", false, set, "taken.dimmer");
+        ASSERT_TRUE(taken.has_value()) << line << taken.error().message;
+        const double saved = static_cast<double>(before.dynamic - costOf(taken->pack).dynamic) / 1e6;
+        EXPECT_NEAR(said, saved, 0.0051) << line;  // as many digits as are printed
+        ++thresholds;
+    }
+    EXPECT_GE(thresholds, 1u);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
