@@ -5,6 +5,8 @@
 #include <gpu/vk_struct.h>
 #include <spirv/level_frag.h>
 #include <spirv/level_vert.h>
+#include <spirv/sphere_frag.h>
+#include <spirv/sphere_vert.h>
 
 #include <cstddef>
 #include <span>
@@ -85,25 +87,22 @@ Expected<RenderPassHandle> createLevelRenderPass(VkDevice device) {
     return RenderPassHandle(device, pass);
 }
 
-Expected<PipelineHandle> createLevelPipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
-                                             VkExtent2D extent) {
-    const auto vertex = createShader(device, spirv::level_vert);
+namespace {
+
+struct Shaders {
+    std::span<const uint32_t> vertex, fragment;
+};
+
+// Opaque, back faces culled.
+Expected<PipelineHandle> createPipeline(VkDevice device, const Shaders& shaders,
+                                        const VkPipelineVertexInputStateCreateInfo& input, VkPipelineLayout layout,
+                                        VkRenderPass render_pass, VkExtent2D extent) {
+    const auto vertex = createShader(device, shaders.vertex);
     if (!vertex) return std::unexpected(vertex.error());
-    const auto fragment = createShader(device, spirv::level_frag);
+    const auto fragment = createShader(device, shaders.fragment);
     if (!fragment) return std::unexpected(fragment.error());
     const VkPipelineShaderStageCreateInfo stages[] = {stage(VK_SHADER_STAGE_VERTEX_BIT, vertex->get()),
                                                       stage(VK_SHADER_STAGE_FRAGMENT_BIT, fragment->get())};
-
-    const VkVertexInputBindingDescription binding{0, sizeof(MeshVertex), VK_VERTEX_INPUT_RATE_VERTEX};
-    const VkVertexInputAttributeDescription attributes[] = {
-        {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(MeshVertex, position_m)},
-        {1, 0, VK_FORMAT_R32G32_SFLOAT, offsetof(MeshVertex, lightmap_uv)}};
-    auto input =
-        vkStruct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
-    input.vertexBindingDescriptionCount = 1;
-    input.pVertexBindingDescriptions = &binding;
-    input.vertexAttributeDescriptionCount = std::size(attributes);
-    input.pVertexAttributeDescriptions = attributes;
     auto assembly =
         vkStruct<VkPipelineInputAssemblyStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO);
     assembly.topology = VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
@@ -151,6 +150,30 @@ Expected<PipelineHandle> createLevelPipeline(VkDevice device, VkPipelineLayout l
     VkPipeline pipeline = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateGraphicsPipelines, device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
     return PipelineHandle(device, pipeline);
+}
+
+}  // namespace
+
+Expected<PipelineHandle> createLevelPipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
+                                             VkExtent2D extent) {
+    const VkVertexInputBindingDescription binding{0, sizeof(MeshVertex), VK_VERTEX_INPUT_RATE_VERTEX};
+    const VkVertexInputAttributeDescription attributes[] = {
+        {0, 0, VK_FORMAT_R32G32B32_SFLOAT, offsetof(MeshVertex, position_m)},
+        {1, 0, VK_FORMAT_R32G32_SFLOAT, offsetof(MeshVertex, lightmap_uv)}};
+    auto input =
+        vkStruct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
+    input.vertexBindingDescriptionCount = 1;
+    input.pVertexBindingDescriptions = &binding;
+    input.vertexAttributeDescriptionCount = std::size(attributes);
+    input.pVertexAttributeDescriptions = attributes;
+    return createPipeline(device, {spirv::level_vert, spirv::level_frag}, input, layout, render_pass, extent);
+}
+
+Expected<PipelineHandle> createSpherePipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
+                                              VkExtent2D extent) {
+    const auto input =
+        vkStruct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
+    return createPipeline(device, {spirv::sphere_vert, spirv::sphere_frag}, input, layout, render_pass, extent);
 }
 
 }  // namespace dimmer::sample

@@ -197,7 +197,7 @@ Expected<void> LevelRenderer::createPipeline() {
 }
 
 void LevelRenderer::record(VkCommandBuffer commands, const CameraPose& camera, const glm::vec3& sky_cd_m2,
-                           const LightState& lights) const {
+                           const LightState& lights, const DrawMore& also) const {
     VkClearValue clear[2]{};
     clear[0].color = {{sky_cd_m2.r, sky_cd_m2.g, sky_cd_m2.b, 1}};
     clear[1].depthStencil = {1, 0};
@@ -208,12 +208,16 @@ void LevelRenderer::record(VkCommandBuffer commands, const CameraPose& camera, c
     begin.clearValueCount = std::size(clear);
     begin.pClearValues = clear;
     vkCmdBeginRenderPass(commands, &begin, VK_SUBPASS_CONTENTS_INLINE);
-    recordMeshes(commands, camera, lights);
+    const glm::mat4 clip_from_world =
+        clipFromWorld(camera, static_cast<float>(extent_.width) / static_cast<float>(extent_.height));
+    recordMeshes(commands, clip_from_world, lights);
+    if (also) also(commands, clip_from_world);
     vkCmdEndRenderPass(commands);
     recordReadback(commands);
 }
 
-void LevelRenderer::recordMeshes(VkCommandBuffer commands, const CameraPose& camera, const LightState& lights) const {
+void LevelRenderer::recordMeshes(VkCommandBuffer commands, const glm::mat4& clip_from_world,
+                                 const LightState& lights) const {
     const VkBuffer vertices = vertices_.buffer.get();
     const VkDeviceSize offset = 0;
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline_.get());
@@ -223,8 +227,6 @@ void LevelRenderer::recordMeshes(VkCommandBuffer commands, const CameraPose& cam
     vkCmdBindIndexBuffer(commands, indices_.buffer.get(), 0, VK_INDEX_TYPE_UINT32);
 
     DrawConstants constants{};
-    const glm::mat4 clip_from_world =
-        clipFromWorld(camera, static_cast<float>(extent_.width) / static_cast<float>(extent_.height));
     constants.exposure = pack_.exposure();
     constants.direction_model = static_cast<uint32_t>(pack_.directionModel());
     for (size_t i = 0; i < draws_.size(); ++i) {

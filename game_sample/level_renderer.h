@@ -8,6 +8,7 @@
 #include <dimmer/runtime.h>
 #include <gpu/memory.h>
 
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -31,8 +32,11 @@ class LevelRenderer {
                                           VkExtent2D extent);
 
     // After the runtime's own recording, in the same command buffer. `sky_cd_m2` is seen where there is no mesh.
+    // `also` draws what else there is in the same pass.
+    using DrawMore = std::function<void(VkCommandBuffer commands, const glm::mat4& clip_from_world)>;
     void record(VkCommandBuffer commands, const CameraPose& camera, const glm::vec3& sky_cd_m2,
-                const LightState& lights) const;
+                const LightState& lights, const DrawMore& also = {}) const;
+    VkRenderPass renderPass() const { return render_pass_.get(); }
 
     // The frame, once the commands have completed on the GPU.
     RadianceFrame read() const;
@@ -50,7 +54,7 @@ class LevelRenderer {
     Expected<void> createRenderPass();
     Expected<void> createDescriptors(const LightmapImages& images);
     Expected<void> createPipeline();
-    void recordMeshes(VkCommandBuffer commands, const CameraPose& camera, const LightState& lights) const;
+    void recordMeshes(VkCommandBuffer commands, const glm::mat4& clip_from_world, const LightState& lights) const;
     void recordReadback(VkCommandBuffer commands) const;
 
     VulkanContext vulkan_;

@@ -1,5 +1,6 @@
 #include "player.h"
 
+#include "balls.h"
 #include "exposure.h"
 #include "image_file.h"
 #include "level_renderer.h"
@@ -10,6 +11,9 @@
 #include <gpu/headless_device.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <pack/pack_data.h>
+
+#include <optional>
 
 namespace dimmer::sample {
 namespace {
@@ -68,8 +72,18 @@ class FrameCommands {
 
 class Player {
    public:
-    Player(const Script& script, Runtime& lights, LevelRenderer& renderer, FrameCommands& commands)
-        : script_(script), lights_(lights), renderer_(renderer), commands_(commands), timeline_(script) {}
+    // `spheres` may be null where there are none to draw.
+    Player(const Script& script, Runtime& lights, LevelRenderer& renderer, FrameCommands& commands, Balls& balls,
+           const SphereRenderer* spheres)
+        : script_(script),
+          lights_(lights),
+          renderer_(renderer),
+          commands_(commands),
+          balls_(balls),
+          sphere_renderer_(spheres),
+          timeline_(script) {
+        if (script.probe_radius_m > 0) probe_spheres_ = probeSpheres(lights.pack(), script.probe_radius_m);
+    }
 
     // Plays the script's next frame.
     Expected<FrameCost> play(uint32_t frame) {
@@ -77,11 +91,18 @@ class Player {
         auto changes = timeline_.advance(frame, lights_);
         if (!changes) return std::unexpected(changes.error());
         cost.changes = std::move(*changes);
+        DIMMER_TRY(balls_.move(frame, lights_));
 
         const auto commands = commands_.begin();
         if (!commands) return std::unexpected(commands.error());
         if (const auto recorded = lights_.record(*commands); !recorded) return std::unexpected(recorded.error());
-        renderer_.record(*commands, timeline_.camera(), script_.sky_cd_m2, lights_);
+        auto spheres = balls_.spheres(lights_);
+        if (!spheres) return std::unexpected(spheres.error());
+        spheres->insert(spheres->end(), probe_spheres_.begin(), probe_spheres_.end());
+        renderer_.record(*commands, timeline_.camera(), script_.sky_cd_m2, lights_,
+                         [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
+                             if (sphere_renderer_) sphere_renderer_->draw(pass, clip_from_world, *spheres);
+                         });
         DIMMER_TRY(commands_.submitAndWait());
 
         const auto stats = lights_.wait();  // the same update, now with its time on the GPU
@@ -97,6 +118,9 @@ class Player {
     Runtime& lights_;
     LevelRenderer& renderer_;
     FrameCommands& commands_;
+    Balls& balls_;
+    const SphereRenderer* sphere_renderer_;
+    std::vector<Sphere> probe_spheres_;
     Timeline timeline_;
 };
 
@@ -112,17 +136,30 @@ Expected<void> resetWeights(Runtime& lights) {
 
 // The script's light without a picture, and back to the beginning. Drivers compile a kernel when it first runs; so they
 // have done it before anything is measured.
-Expected<void> rehearse(const Script& script, Runtime& lights) {
+Expected<void> rehearse(const Script& script, Runtime& lights, Balls& balls) {
     Timeline timeline(script);
     for (uint32_t frame = 0; frame < script.frames; ++frame) {
         const auto changes = timeline.advance(frame, lights);
         if (!changes) return std::unexpected(changes.error());
+        DIMMER_TRY(balls.move(frame, lights));
         if (const auto sent = lights.submit(); !sent) return std::unexpected(sent.error());
     }
     DIMMER_TRY(resetWeights(lights));
     if (const auto sent = lights.submit(); !sent) return std::unexpected(sent.error());
     if (const auto done = lights.wait(); !done) return std::unexpected(done.error());
     return {};
+}
+
+// None where the script has nothing to draw with it.
+Expected<std::optional<SphereRenderer>> createSphereRenderer(const VulkanContext& vulkan, const Script& script,
+                                                             const Runtime& lights, const LevelRenderer& renderer) {
+    size_t count = script.balls.size();
+    if (script.probe_radius_m > 0) count += lights.pack().data().probes.global.positions.size();
+    if (count == 0) return std::nullopt;
+    auto made = SphereRenderer::create(vulkan, lights, renderer.renderPass(), {script.width, script.height},
+                                       static_cast<uint32_t>(count));
+    if (!made) return std::unexpected(made.error());
+    return std::move(*made);
 }
 
 }  // namespace
@@ -136,15 +173,20 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
     if (!device) return std::unexpected(device.error());
     PlayResult result{{}, device->name(), device->driver(), {}};
     {
-        auto lights = Runtime::create(device->context(), pack);
+        auto lights = Runtime::create(device->context(), pack, {.moving_probes_max = movingProbes(script)});
         if (!lights) return std::unexpected(lights.error());
         auto renderer = LevelRenderer::create(device->context(), pack, lights->images(), {script.width, script.height});
         if (!renderer) return std::unexpected(renderer.error());
         auto commands = FrameCommands::create(device->context());
         if (!commands) return std::unexpected(commands.error());
 
-        DIMMER_TRY(rehearse(script, *lights));
-        Player player(script, *lights, *renderer, *commands);
+        auto balls = Balls::create(script, *lights);
+        if (!balls) return std::unexpected(balls.error());
+        auto spheres = createSphereRenderer(device->context(), script, *lights, *renderer);
+        if (!spheres) return std::unexpected(spheres.error());
+
+        DIMMER_TRY(rehearse(script, *lights, *balls));
+        Player player(script, *lights, *renderer, *commands, *balls, *spheres ? &**spheres : nullptr);
         AutoExposure eye(script.adaptation_s, script.fps);
         Progress progress("frames", script.frames);
         for (uint32_t frame = 0; frame < script.frames; ++frame) {

@@ -1,7 +1,9 @@
 #include "script.h"
 
 #include <dimmer/cpu_runtime.h>
+#include <dimmer/probe_grid.h>
 #include <fmt/format.h>
+#include <gpu/vk_result.h>
 #include <update/state_text.h>
 
 #include <algorithm>
@@ -97,9 +99,34 @@ class Parser {
                 if (auto done = number(words, 0, 1e6f, script_.sky_cd_m2[channel]); !done) return done;
             return {};
         }
+        if (name == "ball") return ball(words);
+        if (name == "probes") {
+            DIMMER_TRY(needGrid("probes"));
+            return number(words, 0.001f, 100, script_.probe_radius_m);
+        }
         return fail(
             ErrorCode::BadInput,
-            fmt::format("unknown command \"{}\"; there are size, frames, fps, adapt, sky, camera and at", name));
+            fmt::format("unknown command \"{}\"; there are size, frames, fps, adapt, sky, camera, ball, probes and at",
+                        name));
+    }
+
+    Expected<void> needGrid(std::string_view what) const {
+        if (GridSampler(pack_, {}).empty())
+            return fail(ErrorCode::BadInput,
+                        fmt::format("{} need a global light grid, and the pack has none: cook it with one", what));
+        return {};
+    }
+
+    Expected<void> ball(Words& words) {
+        DIMMER_TRY(needGrid("balls"));
+        Ball ball;
+        DIMMER_TRY(number(words, 0.001f, 100, ball.radius_m));
+        DIMMER_TRY(place(words, ball.from_m));
+        if (!words.accept("to")) return fail(ErrorCode::BadInput, "a ball is RADIUS X Y Z to X Y Z over FRAMES");
+        DIMMER_TRY(place(words, ball.to_m));
+        DIMMER_TRY(frameCount(words, "over", ball.frames));
+        script_.balls.push_back(ball);
+        return {};
     }
 
     Expected<void> step(Words& words) {

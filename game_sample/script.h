@@ -6,6 +6,8 @@
 //     adapt SECONDS                                default 1.2: time constant with which the eye adapts
 //     sky R G B                                    cd/m2 behind everything; default 0 0 0
 //     camera VIEW                                  where it begins
+//     ball RADIUS X Y Z to X Y Z over FRAMES       metres: flies there and back as long as the script lasts
+//     probes RADIUS                                the light probes of the level's grid as spheres, metres
 //     at FRAME set STATE                           hall=0.5,alarm=1/0.2/0.2,door:front=1,all=0
 //     at FRAME fade NAME FROM TO over FRAMES       a light set, weights scalar or r/g/b, or door:NAME, 0..1
 //     at FRAME flicker NAME LOW HIGH for FRAMES seed N    times the weight that the set has then, 0..1
@@ -55,6 +57,13 @@ struct Step {
     std::variant<SetState, Fade, Flicker, CameraCut, CameraMove> action;
 };
 
+// Something that moves, to be lit by the level's light grid.
+struct Ball {
+    float radius_m = 0;
+    glm::vec3 from_m{}, to_m{};
+    uint32_t frames = 1;  // one way
+};
+
 struct Script {
     uint32_t width = 960, height = 540;  // pixels
     uint32_t frames = 1;
@@ -62,7 +71,9 @@ struct Script {
     float adaptation_s = 1.2f;
     glm::vec3 sky_cd_m2{0};
     CameraPose camera;
-    std::vector<Step> steps;  // by frame; those of one frame in the order written
+    std::vector<Ball> balls;
+    float probe_radius_m = 0;  // 0: probes are not drawn
+    std::vector<Step> steps;   // by frame; those of one frame in the order written
 };
 
 inline constexpr uint32_t image_side_max = 8192;  // pixels; keeps a typing error from asking for a terabyte

@@ -8,6 +8,7 @@
 #include <gpu/copy_roof.h>
 #include <gpu/headless_device.h>
 #include <pack/pack_data.h>
+#include <probes/model_slots.h>
 
 #include <algorithm>
 #include <array>
@@ -132,18 +133,25 @@ Expected<void> measureAll(LightState& state, const Update& update, const Roof& r
     return {};
 }
 
+uint32_t movingProbes(const PackData& data) {
+    return data.probes.global.empty() ? 0 : bench_probes;
+}
+
 // More than any update of the pack moves.
 Expected<CopyRoof> roofFor(const VulkanContext& vulkan, const PackData& data) {
     const ProbeData& probes = data.probes;
     const uint64_t receivers = data.addresses.size() + probes.numbers.size();
     const uint64_t written = data.addresses.size() * sizeof(TexelRecord) + probes.numbers.size() * sizeof(ProbeRecord);
     const uint64_t payload = data.payload.size() * sizeof(TexelRecord) + probes.payload.size() * sizeof(ProbeRecord);
-    return CopyRoof::create(vulkan, written + receivers * sizeof(uint32_t) + payload, written);
+    const uint64_t moving = movingProbes(data);
+    return CopyRoof::create(vulkan, written + receivers * sizeof(uint32_t) + payload + moving * resample_bytes_read,
+                            written + moving * resample_bytes_written);
 }
 
 Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, const Mode& mode,
                              const BenchOptions& options, BenchReport& report) {
-    auto runtime = Runtime::create(device.context(), pack, {.mode = *mode.vulkan});
+    auto runtime =
+        Runtime::create(device.context(), pack, {.mode = *mode.vulkan, .moving_probes_max = movingProbes(pack.data())});
     if (!runtime) return std::unexpected(std::move(runtime.error()));
     const Update update = [&]() -> Expected<UpdateStats> {
         if (auto sent = runtime->submit(); !sent) return sent;
@@ -162,7 +170,7 @@ Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, con
 }
 
 Expected<void> measureCpu(const Pack& pack, const Mode& mode, const BenchOptions& options, BenchReport& report) {
-    CpuRuntime runtime(pack, std::max(1u, std::thread::hardware_concurrency()));
+    CpuRuntime runtime(pack, std::max(1u, std::thread::hardware_concurrency()), movingProbes(pack.data()));
     const Update update = [&]() -> Expected<UpdateStats> { return runtime.update(); };
     return measureAll(runtime, update, {}, options, mode.name, report.results);
 }

@@ -1,8 +1,10 @@
 #include <app/bench_cases.h>
 
 #include <fmt/format.h>
+#include <pack/pack_data.h>
 
 #include <algorithm>
+#include <memory>
 
 namespace dimmer::cook {
 namespace {
@@ -49,6 +51,31 @@ BenchCase flicker(uint32_t sets) {
             }};
 }
 
+// Models of 4 x 4 x 4 probes, each a step further every frame, from places spread over the grid's box.
+BenchCase moveModels(const Pack& pack) {
+    auto models = std::make_shared<std::vector<Model>>();
+    const StartGrid box = pack.data().probes.global.start;
+    return {fmt::format("{} models moved", bench_models), [=](LightState& state, uint32_t frame) -> Expected<void> {
+                for (uint32_t i = 0; i < bench_models; ++i) {
+                    Transform place;
+                    for (size_t axis = 0; axis < 3; ++axis) {
+                        const uint32_t strides[] = {37, 11, 53};
+                        const auto step = static_cast<float>((i * strides[axis] + frame / 8) % bench_models);
+                        const float share = (step + static_cast<float>(frame % 8) / 8) / bench_models;
+                        place.rows[axis][3] = box.min_m[axis] + share * (box.max_m[axis] - box.min_m[axis]);
+                    }
+                    if (frame > 0) {
+                        if (auto ok = state.moveModel((*models)[i], place); !ok) return ok;
+                        continue;
+                    }
+                    const auto model = state.addModel({{-1, -1, -1}, {1, 1, 1}, {4, 4, 4}}, place);
+                    if (!model) return std::unexpected(model.error());
+                    models->push_back(*model);
+                }
+                return {};
+            }};
+}
+
 }  // namespace
 
 std::vector<BenchCase> casesOf(const Pack& pack) {
@@ -61,6 +88,7 @@ std::vector<BenchCase> casesOf(const Pack& pack) {
     for (uint32_t n = 2; n < sets; n *= 2) cases.push_back(changeSets(fmt::format("{} sets changed", n), n));
     if (sets >= 5) cases.push_back(flicker(sets));
     cases.push_back(changeSets("all sets changed", sets));
+    if (!pack.data().probes.global.empty()) cases.push_back(moveModels(pack));
     return cases;
 }
 

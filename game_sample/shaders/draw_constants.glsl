@@ -1,4 +1,4 @@
-// What one draw call gets as push constants: shared by C++ (level_renderer.cpp) and GLSL (level.vert, level.frag).
+// What one draw call gets as push constants: shared by C++ (level_renderer.cpp, sphere_renderer.cpp) and GLSL.
 #ifndef DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
 #define DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
 
@@ -18,6 +18,13 @@ struct DrawConstants {
     vec3 emission_cd_m2;  // times the weight of its light set
     float exposure;       // Pack::exposure()
     uint direction_model;  // Pack::directionModel()
+};
+
+// For all spheres.
+struct SphereConstants {
+    mat4 clip_from_world;
+    float exposure;
+    uint color_format;  // Pack::colorFormat()
 };
 
 #ifdef __cplusplus

@@ -147,10 +147,10 @@ void CpuRuntime::updateProbes() {
 
 void CpuRuntime::updateModels(UpdateStats& stats) {
     const PackData& data = pack().data();
-    for (const ResampleItem& item : models().take(0)) {
+    const auto items = models().take(0);
+    for (const ResampleItem& item : items)
         resampleItem(data, item, static_cast<uint32_t>(data.probes.base.size()), probes_, hints_);
-        stats.probes_resampled += item.count;
-    }
+    countResampled(items, stats);
     ++stats.dispatches;
 }
 

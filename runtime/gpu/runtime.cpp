@@ -267,8 +267,7 @@ bool Runtime::planNext() {
     }
     impl.stats = next.stats();
     if (impl.probes_planned) addProbes(probePlanner(impl.target).stats(), impl.stats);
-    if (impl.models_planned)
-        for (const ResampleItem& item : impl.model_items) impl.stats.probes_resampled += item.count;
+    if (impl.models_planned) countResampled(impl.model_items, impl.stats);
     const bool any = impl.texels_planned || impl.probes_planned || impl.models_planned;
     // The other pages may hold the state already, when it is one of before.
     if (!any) impl.front = impl.target;

@@ -150,6 +150,14 @@ std::vector<Box> boxesOfClusters(const PackData& data) {
     return boxes;
 }
 
+void countResampled(std::span<const ResampleItem> items, UpdateStats& stats) {
+    uint64_t probes = 0;
+    for (const ResampleItem& item : items) probes += item.count;
+    stats.probes_resampled += probes;
+    stats.bytes_read += probes * resample_bytes_read;
+    stats.bytes_written += probes * resample_bytes_written;
+}
+
 ModelSlots::ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_sets)
     : first_probe_(static_cast<uint32_t>(data.probes.base.size())),
       probes_max_((probes_max + probes_granule - 1) / probes_granule * probes_granule),

@@ -1,7 +1,7 @@
 // The probes of moving models: who has which, and which are to be taken from the global grid anew. No Vulkan in it.
 #pragma once
 
-#include <dimmer/error.h>
+#include <dimmer/light_state.h>
 #include <dimmer/models.h>
 #include <pack/pack_data.h>
 #include <update/record_pool.h>
@@ -24,6 +24,11 @@ struct Box {
 // Per cluster of probes: the box of all tetrahedra that one of its probes is a corner of. A place outside is not lit by
 // them. Clusters without global probes have an empty box.
 std::vector<Box> boxesOfClusters(const PackData& data);
+
+// What taking a probe anew moves at least: its tetrahedron, the places and light of the four corners, hint and result.
+inline constexpr uint64_t resample_bytes_read = 48 + 4 * (16 + sizeof(ProbeRecord)) + sizeof(uint32_t);
+inline constexpr uint64_t resample_bytes_written = sizeof(ProbeRecord) + sizeof(uint32_t);
+void countResampled(std::span<const ResampleItem> items, UpdateStats& stats);
 
 class ModelSlots {
    public:

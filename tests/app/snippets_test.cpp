@@ -40,6 +40,23 @@ dimmer::Expected<void> moveOn(dimmer::Runtime& lights, dimmer::LightSet cellar, 
     return {};
 }
 
+void draw(const ModelSlot&, VkBuffer, VkBuffer) {}
+
+dimmer::Expected<void> addCrate(dimmer::Runtime& lights, const std::array<float, 3>& crate_min_m,
+                                const std::array<float, 3>& crate_max_m, const dimmer::Transform& transform,
+                                const dimmer::Transform& moved) {
+    // snippet: models
+    const dimmer::ModelGrid grid = dimmer::modelGrid(crate_min_m, crate_max_m);  // 2 probes an axis, or every 1.5 m
+    const auto crate = lights.addModel(grid, transform);                         // OutOfMemory: no room is left
+    if (!crate) return std::unexpected(crate.error());
+    if (auto ok = lights.moveModel(*crate, moved); !ok) return ok;  // any frame, before its update
+    const auto slot = lights.modelSlot(*crate);                     // for the shader; changes with the transform
+    if (!slot) return std::unexpected(slot.error());
+    draw(*slot, lights.probes(lights.pageSet()), lights.gridTable());
+    // end snippet
+    return {};
+}
+
 size_t uploaded = 0;
 void upload(const std::string&, const std::vector<MeshVertex>& vertices, const std::vector<uint32_t>&, uint32_t) {
     uploaded += vertices.size();
@@ -170,6 +187,8 @@ TEST_F(SnippetsGpu, LoadChangeAndUpdate) {
     ASSERT_TRUE(lights->wait().has_value());
     const auto hall = *lights->lightSet("hall");
     ASSERT_TRUE(moveOn(*lights, hall, hall).has_value());
+    // No grid in this pack: the first call says so.
+    EXPECT_EQ(addCrate(*lights, {0, 0, 0}, {1, 1, 1}, {}, {}).error().code, ErrorCode::Unsupported);
 }
 
 TEST(Snippets, CpuAndMeshes) {
@@ -234,7 +253,7 @@ TEST(Snippets, DocumentsQuoteThem) {
     const std::filesystem::path root = DIMMER_SOURCE_DIR;
     auto snippets = snippetsOf(readText(root / "tests/app/snippets_test.cpp"));
     snippets.merge(snippetsOf(readText(root / "tests/c/c_api.c")));
-    ASSERT_EQ(snippets.size(), 10u);
+    ASSERT_EQ(snippets.size(), 11u);
     for (const char* document : {"README.md", "docs/integrate.md"}) {
         const auto quotes = quotesOf(readText(root / document));
         EXPECT_FALSE(quotes.empty()) << document;

@@ -1,9 +1,11 @@
 // Radiance of a wall that fills the view, against its closed form: reflectance * irradiance / pi + emission * weight.
 #include <format/texel.h>
+#include <game_sample/balls.h>
 #include <game_sample/level_renderer.h>
 #include <game_sample/player.h>
 #include <gpu/headless_device.h>
 #include <gtest/gtest.h>
+#include <probes/tetrahedra.h>
 
 #include <fstream>
 #include <glm/gtc/packing.hpp>
@@ -52,8 +54,9 @@ PackData wall(bool faces_viewer) {
     return data;
 }
 
-// One frame seen from the origin along -Z, with `weight` on the lamp.
-glm::vec3 middlePixel(const PackData& data, Weight weight) {
+// One frame seen from the origin along -Z, with `weight` on the lamp, once the script's balls have reached
+// `frame_number`.
+glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script = {}, uint32_t frame_number = 0) {
     const auto pack = Pack::fromData(data);
     EXPECT_TRUE(pack);
     const auto device = HeadlessDevice::create({.validation = true, .graphics = true});
@@ -61,10 +64,15 @@ glm::vec3 middlePixel(const PackData& data, Weight weight) {
     const VulkanContext vulkan = device->context();
     glm::vec3 middle{-1};
     {
-        auto lights = Runtime::create(vulkan, *pack);
+        auto lights = Runtime::create(vulkan, *pack, {.moving_probes_max = movingProbes(script)});
         EXPECT_TRUE(lights && lights->setWeight(*lights->lightSet("lamp"), weight));
         auto renderer = LevelRenderer::create(vulkan, *pack, lights->images(), {16, 8});
         EXPECT_TRUE(renderer);
+        auto balls = Balls::create(script, *lights);
+        EXPECT_TRUE(balls && balls->move(frame_number, *lights));
+        std::optional<SphereRenderer> spheres;
+        if (!script.balls.empty())
+            spheres.emplace(*SphereRenderer::create(vulkan, *lights, renderer->renderPass(), {16, 8}, 8));
 
         VkCommandPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, vulkan.queue_family};
         VkCommandPool pool = VK_NULL_HANDLE;
@@ -76,7 +84,10 @@ glm::vec3 middlePixel(const PackData& data, Weight weight) {
         VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
         vkBeginCommandBuffer(commands, &begin);
         EXPECT_TRUE(lights->record(commands));
-        renderer->record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, *lights);
+        renderer->record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, *lights,
+                         [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
+                             if (spheres) spheres->draw(pass, clip_from_world, *balls->spheres(*lights));
+                         });
         vkEndCommandBuffer(commands);
         VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO, nullptr, 0, nullptr, nullptr, 1, &commands, 0, nullptr};
         vkQueueSubmit(vulkan.queue, 1, &submit, VK_NULL_HANDLE);
@@ -100,6 +111,28 @@ void expectRadiance(const glm::vec3& pixel, const glm::vec3& expected) {
 TEST(SampleLevelRenderer, RadianceIsReflectedAndEmittedLight) {
     constexpr float e_pi = irradiance_lux / std::numbers::pi_v<float>;
     expectRadiance(middlePixel(wall(true), 1), {0.5f * e_pi, 0.25f * e_pi + 8, 0.75f * e_pi});
+}
+
+// Light of 40 lux from all sides (radiance 40 / pi, L_00 = sqrt(4 pi) times that): a ball of 0.75 in it has 0.75 * 40 /
+// pi all over; once it has flown away the wall shows.
+TEST(SampleLevelRenderer, ABallIsLitByTheLightGridWhereItIs) {
+    constexpr float ball_lux = 40, pi = std::numbers::pi_v<float>;
+    PackData data = wall(true);
+    std::vector<glm::vec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -2}};
+    data.probes.global = cook::tetrahedralise(points, {glm::vec3(-5), glm::vec3(5)}).value();
+    const float stored = std::sqrt(4 * pi) * ball_lux / pi * exposure;
+    data.probes.base.assign(data.probes.global.positions.size(), {encodeR11G11B10(stored, stored, stored), {}});
+    data.probes.record_counts = {0};
+    Script script;
+    script.balls = {{0.4f, {0, 0, -1}, {8, 0, -1}, 10}};
+    const float lit = 0.75f * ball_lux / pi;
+    // Two roundings to the 5 bits of blue and 6 of the others: 1/64 each at worst.
+    const glm::vec3 ball = middlePixel(data, 1, script, 0);
+    for (int channel = 0; channel < 3; ++channel) EXPECT_NEAR(ball[channel], lit, lit / 32);
+    constexpr float e_pi = irradiance_lux / pi;
+    expectRadiance(middlePixel(data, 1, script, 10), {0.5f * e_pi, 0.25f * e_pi + 8, 0.75f * e_pi});
+    EXPECT_EQ(placeOf(script.balls[0], 20), script.balls[0].from_m);
+    EXPECT_EQ(placeOf(script.balls[0], 30), script.balls[0].to_m);
 }
 
 TEST(SampleLevelRenderer, EmissionFollowsItsSet) {

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <pack/pack_data.h>
+#include <probes/tetrahedra.h>
 
 #include <numbers>
 
@@ -49,6 +50,26 @@ TEST(SampleScript, ReadsSettings) {
     EXPECT_EQ(script.camera.position_m, glm::vec3(4, 5, 6));
 }
 
+TEST(SampleScript, ReadsBallsAndProbes) {
+    PackData data = makePack().data();
+    const glm::vec3 points[] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    data.probes.global = cook::tetrahedralise(points, {glm::vec3(0), glm::vec3(1)}).value();
+    data.probes.base.resize(data.probes.global.positions.size());
+    data.probes.record_counts.assign(data.contributions.size(), 0);
+    const auto pack = Pack::fromData(std::move(data));
+    ASSERT_TRUE(pack) << pack.error().message;
+    const auto script = parseScript("probes 0.1\nball 0.25 1 2 3 to 4 5 6 over 30\n", "test.script", *pack);
+    ASSERT_TRUE(script) << script.error().message;
+    EXPECT_EQ(script->probe_radius_m, 0.1f);
+    ASSERT_EQ(script->balls.size(), 1u);
+    EXPECT_EQ(script->balls[0].radius_m, 0.25f);
+    EXPECT_EQ(script->balls[0].from_m, glm::vec3(1, 2, 3));
+    EXPECT_EQ(script->balls[0].to_m, glm::vec3(4, 5, 6));
+    EXPECT_EQ(script->balls[0].frames, 30u);
+    for (const char* wrong : {"ball 1 2 3", "ball 0 0 0 0 to 1 1 1 over 3", "ball 1 0 0 0 to 1 1 1", "probes 0"})
+        EXPECT_FALSE(parseScript(wrong, "test.script", *pack)) << wrong;
+}
+
 TEST(SampleScript, BeginsWithTheFirstCameraOfTheLevel) {
     EXPECT_EQ(parse("").camera.position_m, glm::vec3(1, 2, 3));
 }
@@ -93,6 +114,8 @@ TEST(SampleScript, WithoutFramesLastsASecondPastTheLastStep) {
 TEST(SampleScript, ErrorsNameTheLineAndTheMend) {
     EXPECT_THAT(parseError("\n\nat 5 set hal=1"), AllOf(StartsWith("test.script:3: "), HasSubstr("hal")));
     EXPECT_THAT(parseError("frame 5"), HasSubstr("unknown command \"frame\""));
+    EXPECT_THAT(parseError("ball 1 0 0 0 to 1 0 0 over 9"), HasSubstr("balls need a global light grid"));
+    EXPECT_THAT(parseError("probes 0.1"), HasSubstr("probes need a global light grid"));
     EXPECT_THAT(parseError("at 5 explode hall"), HasSubstr("unknown action \"explode\""));
     EXPECT_THAT(parseError("camera attic"), HasSubstr("overview"));
     EXPECT_THAT(parseError("at x set hall=1"), HasSubstr("\"x\""));
