@@ -25,7 +25,7 @@ h1{font-size:1.4rem;overflow-wrap:anywhere}h2{font-size:1.1rem;margin:2rem 0 .6r
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%}
 th,td{padding:.3rem .6rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
-th:first-child,td:first-child{text-align:left;white-space:normal;overflow-wrap:anywhere}
+th:first-child,td:first-child{text-align:left;white-space:normal;overflow-wrap:anywhere;min-width:7rem}
 .bars{display:grid;grid-template-columns:minmax(6rem,auto) 1fr auto;gap:.35rem .7rem;align-items:center}
 .track{background:#27272a;height:1rem;border-radius:3px;overflow:hidden}
 .track i{display:block;height:100%;background:var(--bar)}.track i.over{background:var(--over)}
@@ -33,6 +33,8 @@ select{font:inherit;padding:.4rem;width:100%;max-width:28rem;background:#27272a;
 .page{margin:.8rem 0}.page img{width:100%;image-rendering:pixelated;display:block;background:#000}
 .key span{display:inline-block;padding:.1rem .5rem;margin:0 .2rem .2rem 0;border-radius:3px}
 li{overflow-wrap:anywhere;margin:.3rem 0}
+@media(max-width:36rem){th,td{padding:.3rem .35rem}.bars{grid-template-columns:minmax(2rem,auto) 1fr}
+.bars small{grid-column:1/-1;margin-top:-.35rem}}
 )";
 
 // Shows the pictures of what was chosen.
@@ -210,13 +212,17 @@ class Report {
     }
 
     void overlaps() {
+        constexpr size_t rows_max = 16;
         const auto& histogram = cost_.overlap_histogram;
+        std::vector<uint64_t> rows(histogram.begin(), histogram.begin() + static_cast<std::ptrdiff_t>(std::min(
+                                                                              histogram.size(), rows_max + 1)));
+        for (size_t n = rows.size(); n < histogram.size(); ++n) rows.back() += histogram[n];
         uint64_t most = 1;
-        for (size_t n = 1; n < histogram.size(); ++n) most = std::max(most, histogram[n]);
+        for (size_t n = 1; n < rows.size(); ++n) most = std::max(most, rows[n]);
         body_ += "<h2>Contributions at a texel</h2>\n<div class=bars>\n";
-        for (size_t n = 1; n < histogram.size(); ++n)
-            body_ += bar(fmt::format("{}", n), static_cast<double>(histogram[n]) / static_cast<double>(most),
-                         fmt::format("{} texels", histogram[n]));
+        for (size_t n = 1; n < rows.size(); ++n)
+            body_ += bar(fmt::format("{}{}", n, n == rows_max && histogram.size() > rows.size() ? " and more" : ""),
+                         static_cast<double>(rows[n]) / static_cast<double>(most), fmt::format("{} texels", rows[n]));
         body_ += fmt::format("</div>\n<p class=dim>{} texels never change.</p>\n", histogram[0]);
     }
 

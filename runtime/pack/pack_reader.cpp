@@ -171,7 +171,7 @@ class Reader {
     }
 
     static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record) {
-        if (record <= 1 || bytes.size() % record != 0) return bytes;
+        if (record <= 1 || bytes.empty() || bytes.size() % record != 0) return bytes;
         const size_t count = bytes.size() / record;
         std::vector<std::byte> out(bytes.size());
         for (size_t b = 0; b < record; ++b)

@@ -31,6 +31,9 @@ TEST_F(Commands, HelpExplainsEachCommandWithUnitsAndAnExample) {
         {"cook", {"LEVEL", "--profile", "--quality", "--threads", "bytes", "metre", "=preview"}},
         {"inspect", {"PACK", "--json", "--settings", "bytes"}},
         {"sample", {"PACK", "--points", "--state", "--backend", "lux", "metres", "cm"}},
+        {"explain", {"PACK", "--point", "--normal", "metres", "cm", "lux", "bytes"}},
+        {"export", {"PACK", "DIR", "lux", "index.json"}},
+        {"report", {"PACK", "--verify", "--heatmap", "bytes"}},
         {"bench", {"PACK", "--mode", "--frames", "=100"}},
     };
     for (const auto& [command, words] : commands) {

@@ -48,6 +48,40 @@ void checkScene(const Scene& scene) {
                     "combined elements are there");
 }
 
+// What the full level has not: a texture with a transform, a measured luminaire, a camera, a spot, a matrix, a door's
+// pose and quantized attributes.
+cook::test::LevelFile rareLevel() {
+    using nlohmann::json;
+    cook::test::LevelFile level = cook::test::fullLevel();
+    json& d = level.document;
+    d["images"] =
+        json::array({{{"uri",
+                       "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8/5+hHgAHggJ/"
+                       "PchI7wAAAABJRU5ErkJggg=="}}});
+    d["textures"] = json::array({{{"source", 0}}});
+    d["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {
+        {"index", 0}, {"extensions", {{"KHR_texture_transform", {{"offset", {0.25, 0.5}}, {"rotation", 0.5}}}}}};
+    d["materials"][0]["alphaMode"] = "MASK";
+    level.primitive(0)["attributes"]["TEXCOORD_0"] = level.addVec2({{0, 0}, {0, 1}, {1, 1}, {1, 0}});
+    d["extensionsUsed"] = {"KHR_texture_transform", "EXT_lights_ies", "KHR_mesh_quantization"};
+    const std::string ies = "TILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 20\n0 90\n0\n100 10\n";
+    d["extensions"]["EXT_lights_ies"]["lights"] =
+        json::array({{{"bufferView", level.addView(ies.data(), ies.size())}, {"mimeType", "application/x-ies-lm-63"}}});
+    level.addNode({{"name", "tube"},
+                   {"extensions", {{"EXT_lights_ies", {{"light", 0}, {"multiplier", 2}, {"color", {1, 0.5, 1}}}}}},
+                   {"matrix", {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 2, 0, 1}}});
+    d["cameras"] = json::array({{{"type", "perspective"}, {"perspective", {{"yfov", 0.8}, {"znear", 0.1}}}}});
+    level.addNode({{"name", "view"}, {"camera", 0}, {"rotation", {0, 0.6, 0, 0.8}}});
+    d["nodes"][2]["extras"].update({{"dimmer_door_open", "pose"}, {"dimmer_door_translation", {0, 2, 0}}});
+    const std::vector<int16_t> corners = {0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0};  // three of four, each padded to 8 bytes
+    const int view = level.addView(corners.data(), 24);
+    d["bufferViews"][static_cast<size_t>(view)]["byteStride"] = 8;
+    const int positions = level.addAccessor(view, 5122, 3, "VEC3");
+    d["meshes"].push_back({{"primitives", json::array({{{"attributes", {{"POSITION", positions}}}, {"mode", 5}}})}});
+    level.addNode({{"name", "quantized"}, {"mesh", d["meshes"].size() - 1}});
+    return level;
+}
+
 }  // namespace
 
 void runGltf(Input input) {
@@ -62,7 +96,11 @@ void runGltf(Input input) {
 
 std::vector<Bytes> gltfSeeds() {
     const cook::test::LevelFile full = cook::test::fullLevel(), floor = cook::test::LevelFile::withFloor();
-    return {full.glb(), bytesOf(full.gltfText()), floor.glb(), bytesOf(floor.gltfText())};
+    const cook::test::LevelFile rare = rareLevel();
+    const auto imported = rare.import();
+    require(imported.has_value() && imported->images.size() == 1, "the rare seed is a level");
+    return {full.glb(), bytesOf(full.gltfText()), floor.glb(), bytesOf(floor.gltfText()),
+            rare.glb(), bytesOf(rare.gltfText())};
 }
 
 }  // namespace dimmer::fuzz

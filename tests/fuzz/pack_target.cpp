@@ -1,10 +1,12 @@
 // Packs. Sizes and hashes are put right before reading, or nothing but the hash check would ever be reached.
 #include <dimmer/cpu_runtime.h>
+#include <dimmer/probe_grid.h>
 #include <format/layout.h>
 #include <fuzz/target.h>
 #include <pack/pack_file.h>
 #include <pack/sample_pack.h>
 #include <pipeline/budget.h>
+#include <runtime/model_pack.h>
 #include <write/pack_writer.h>
 #include <xxhash.h>
 
@@ -58,6 +60,15 @@ bool unfoldsTooFar(const Bytes& file) {
     return sum > unfolded_max;
 }
 
+// Walks through the global grid and looks light up there, inside of it and far away.
+void useGrid(const Pack& pack, const CpuRuntime& runtime) {
+    const GridSampler grid(pack, runtime.probes());
+    GridHint hint;
+    for (const float at : {0.0f, 1.0f, 5.5f, -1e6f, 11.9f})
+        for (const float channel : grid.sample({at, at / 3, at}, {0, 1, 0}, &hint))
+            require(!std::isnan(channel) && channel >= 0, "light in the air is never NaN nor negative");
+}
+
 void use(const Pack& pack) {
     CpuRuntime runtime(pack);
     runtime.update();
@@ -71,6 +82,7 @@ void use(const Pack& pack) {
     const auto lux = sampleLightmap(pack, runtime.irradiancePages(), runtime.directionPages(), pack.pageCount() - 1,
                                     {0.5f, 0.25f}, {0, 0, 1});
     for (const float channel : lux) require(!std::isnan(channel) && channel >= 0, "light is never NaN nor negative");
+    useGrid(pack, runtime);
     require(cook::costOf(pack.data()).elements.size() == pack.elements().size(), "every element has a cost");
 }
 
@@ -141,7 +153,12 @@ std::vector<Bytes> packSeeds() {
     whole.color_format = ColorFormat::E5B9G9R9;
     const auto compressed = cook::packBytes(whole);
     const auto* first = reinterpret_cast<const uint8_t*>(compressed.data());
-    return {withRawChunks(small), withRawChunks(probes), withRawChunks(whole), {first, first + compressed.size()}};
+    const PackData grid = test::modelPack(5, 6, [](glm::vec3 p) { return p * 0.25f; });
+    return {withRawChunks(small),
+            withRawChunks(probes),
+            withRawChunks(whole),
+            withRawChunks(grid),
+            {first, first + compressed.size()}};
 }
 
 }  // namespace dimmer::fuzz

@@ -44,6 +44,8 @@ constexpr std::array list = {
     Target{"profile", runProfile, profileSeeds, megabyte, 1000},
     Target{"state", runState, stateSeeds, megabyte, 1000},
     Target{"script", runScript, scriptSeeds, megabyte, 1000},
+    // 16 MiB of texels are the most that runHdr asks for.
+    Target{"hdr", runHdr, hdrSeeds, 20 * megabyte, 1000},
     Target{"ies", runIes, iesSeeds, megabyte, 1000},
 };
 

@@ -52,6 +52,8 @@ void runState(Input input);
 std::vector<Bytes> stateSeeds();
 void runScript(Input input);
 std::vector<Bytes> scriptSeeds();
+void runHdr(Input input);
+std::vector<Bytes> hdrSeeds();
 void runIes(Input input);
 std::vector<Bytes> iesSeeds();
 

@@ -91,6 +91,26 @@ TEST(PackDamage, FlippedBitsInEveryChunkAreNamed) {
     }
 }
 
+// Found by fuzzing: nothing to unshuffle took as many steps as a record claimed to have bytes, 4 billion for each
+// chunk.
+TEST(PackDamage, AnEmptyChunkOfHugeRecordsIsReadAtOnce) {
+    PackData data = samplePack();
+    data.meshes.clear();
+    data.viewpoints.clear();
+    // Without receivers: empty payloads.
+    for (int i = 0; i < 200; ++i) data.contributions.push_back({});
+    PackFile file(packBytes(data));
+    size_t empty = 0;
+    for (ChunkContent& c : file.chunks) {
+        if (!c.bytes.empty()) continue;
+        c.shuffle = UINT32_MAX;
+        ++empty;
+    }
+    EXPECT_GE(empty, 200u);
+    const auto pack = Pack::fromBytes(file.bytes(), "level.dimmer");
+    EXPECT_TRUE(pack.has_value()) << pack.error().message;  // 800 billion steps would be minutes
+}
+
 TEST(PackDamage, ForeignFiles) {
     const Bytes whole = packBytes(samplePack());
     Bytes other = whole;
