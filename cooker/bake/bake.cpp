@@ -3,6 +3,7 @@
 #include <bake/denoise.h>
 #include <bake/final_gather.h>
 #include <bake/series.h>
+#include <probes/grid_bake.h>
 
 #include <atomic>
 
@@ -17,7 +18,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
-        FinalGather gather(gatherer);
+        FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
         std::vector<uint32_t> terms;
         uint64_t traced = 0;
@@ -63,10 +64,12 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
     out.rays = series.rays;
     out.light = gatherAll(gatherer, series, settings, progress, out.rays);
     out.terms = paths.terms();
-    out.reports = std::move(series.reports);
+    out.reports = series.reports;
     out.bounces = series.bounces;
     out.warnings = std::move(series.warnings);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
+    const Expected<void> grid = bakeGrid(gatherer, series, settings, progress, out);
+    if (!grid) out.warnings.push_back("no global grid: " + grid.error().message);
     series = {};
     if (settings.denoise) out.light = denoise(unwrap, texels, std::move(out.light), progress);
     out.light = withDirect(out.light, direct);

@@ -122,7 +122,13 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality) {
             .tail_max = quality.tolerance,
             .threshold = profile.threshold,
             .light_grid = quality.light_grid,
-            .per_set_passes = quality.per_set_passes};
+            .per_set_passes = quality.per_set_passes,
+            .grid = {.probes_max = profile.probes_max,
+                     .min_spacing_m = profile.global_min_spacing_m,
+                     .sites = quality.probe_sites,
+                     .uniform = quality.grid_baseline == "uniform",
+                     .fit = quality.grid_baseline != "unfitted",
+                     .visibility = quality.grid_baseline != "unseen"}};
 }
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
@@ -179,6 +185,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, contribution_of_term, pack);
+        buildProbeClusters(baked.grid, contribution_of_term, pack);
+        stats.free_volume_m3 = baked.grid.free_volume_m3;
         pack.meshes = levelMeshes(*rays, charts);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);
@@ -197,6 +205,7 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
         quality->per_set_passes = options.per_set_passes;
         quality->light_grid = options.light_grid;
         quality->suggest_combinations = options.suggest_combinations;
+        quality->grid_baseline = options.grid_baseline;
     }
     CookResult result;
     Expected<Scene> scene;

@@ -50,6 +50,9 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"lightmaps.color", &p.color_format},
         {"lightmaps.model", &p.direction_model},
         {"records.threshold", &p.threshold, 0, 1},
+        {"grids.probes_max", &p.probes_max, 0, 1 << 20},
+        {"grids.global_min_spacing", &p.global_min_spacing_m, 0.1, 1000},
+        {"grids.local_spacing", &p.local_spacing_m, 0.1, 100},
     };
     for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}}) {
         const std::string prefix = fmt::format("bake.{}.", name);
@@ -59,6 +62,7 @@ std::vector<Setting> settingsOf(Profile& p) {
         list.push_back({prefix + "emitter_samples", &q->emitter_samples, 0, 4096});
         list.push_back({prefix + "noise", &q->noise, 0, 1});
         list.push_back({prefix + "denoise", &q->denoise, 0, 1});
+        list.push_back({prefix + "probe_sites", &q->probe_sites, 1, 256});
         list.push_back({prefix + "bounces", &q->bounces, 1, 1024});
         list.push_back({prefix + "tolerance", &q->tolerance, 1e-6, 1});
     }
