@@ -22,12 +22,12 @@ layout(push_constant) uniform Dispatch {
 dispatch;
 
 // Texel buffers, as lavapipe loads 16 bytes from one several times faster than from a storage buffer.
-layout(set = 0, binding = 0) uniform utextureBuffer addresses;  // TexelAddress, two receivers an element
+layout(set = 0, binding = 0) uniform utextureBuffer places;     // two receivers an element, a byte each: BatchTiles::add
 layout(set = 0, binding = 1) uniform utextureBuffer base;       // two records an element
 layout(set = 0, binding = 2) uniform utextureBuffer payload;    // two records an element
-layout(set = 0, binding = 3) uniform utextureBuffer work;       // WorkItem
+layout(set = 0, binding = 3) uniform utextureBuffer work;       // TexelItem
 layout(set = 0, binding = 4) uniform utextureBuffer terms;      // WorkTerm
-layout(set = 0, binding = 5) uniform utextureBuffer places;     // BatchPlace
+layout(set = 0, binding = 5) uniform utextureBuffer batches;    // TexelBatch
 layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray irradiance_pages;
 layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray direction_pages;
 
@@ -41,8 +41,20 @@ const ivec3 nowhere = ivec3(-1);
 
 // Eight lanes share these.
 struct Item {
-    uvec4 work, place;  // WorkItem, BatchPlace
+    uint first_term, term_count;
+    uvec4 batch;  // TexelBatch
 };
+
+Item load_item(uint index) {
+    uvec2 work_item = texelFetch(work, int(index)).xy;
+    const uint low_26 = 0x3ffffffu;
+    return Item(work_item.y & low_26, work_item.x >> 26 | work_item.y >> 26 << 6,
+                texelFetch(batches, int(work_item.x & low_26)));
+}
+
+uint receiver_count(Item item) {
+    return (item.batch.y >> 18 & 63u) + 1u;
+}
 
 // The pair of records `offset` receivers into the item.
 uvec4 load_pair(uint first_record, uint offset) {
@@ -51,21 +63,21 @@ uvec4 load_pair(uint first_record, uint offset) {
 
 // The item's first record of a term, and its weight.
 uvec4 locate(Item item, uint index) {
-    uvec4 term = texelFetch(terms, int(item.work.y + index));
-    return uvec4(term.x + item.place.z, term.yzw);
+    uvec4 term = texelFetch(terms, int(item.first_term + index));
+    return uvec4(term.x + item.batch.x, term.yzw);
 }
 
 // Past an item's last term its record stands in, weighted with 0: that changes no bit of a sum.
 uvec4 load_term(Item item, uint t) {
     if (terms_on >= 0 && terms_on <= exact_max) return locate(item, t);
-    uint count = item.work.z;
+    uint count = item.term_count;
     uvec4 term = locate(item, min(t, count - 1u));
     return t < count ? term : uvec4(term.x, 0, 0, 0);
 }
 
 // Both texels of a pair with `terms_on` terms; all is loaded before it is used, one texel's sums live at a time.
 uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
-    uvec4 base_pair = texelFetch(base, int((item.place.x + offset) >> 1));
+    uvec4 base_pair = texelFetch(base, int((item.batch.x + offset) >> 1));
     if (terms_on == 0) return base_pair;
     uvec4 pair[specialised_max];
     for (int t = 0; t < terms_on; ++t) pair[t] = load_pair(term[t].x, offset);
@@ -83,12 +95,12 @@ uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
 
 // The same for any number of terms, in blocks within which the sums stay in registers; padded like load_term.
 uvec4 blend_pair_loop(Item item, uint offset) {
-    uvec4 base_pair = texelFetch(base, int((item.place.x + offset) >> 1));
+    uvec4 base_pair = texelFetch(base, int((item.batch.x + offset) >> 1));
     DimmerTexelBlend first = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
     DimmerTexelBlend second = first;
     dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale(color_format)), color_format);
     dimmer_blend_add(second, base_pair.z, base_pair.w, vec3(dimmer_weight_scale(color_format)), color_format);
-    for (uint begin = 0u; begin < item.work.z; begin += uint(block)) {
+    for (uint begin = 0u; begin < item.term_count; begin += uint(block)) {
         uvec4 pair[block];
         vec3 weight[block];
         for (int t = 0; t < block; ++t) {
@@ -102,8 +114,12 @@ uvec4 blend_pair_loop(Item item, uint offset) {
     return uvec4(dimmer_blend_encode(first, color_format), dimmer_blend_encode(second, color_format));
 }
 
-ivec3 texel_of(uint address) {
-    return ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);
+// A receiver's texel, by its byte.
+ivec3 texel_of(Item item, uint place) {
+    uint tile_3 = item.batch.z >> 18 | item.batch.w >> 18 << 14;
+    uint even = (place & 128u) == 0u ? item.batch.y : item.batch.w, odd = (place & 128u) == 0u ? item.batch.z : tile_3;
+    uint tile = (place & 64u) == 0u ? even : odd;
+    return ivec3((tile & 511u) << 3 | (place & 7u), (tile >> 9 & 511u) << 3 | (place >> 3 & 7u), item.batch.y >> 24);
 }
 
 void store(ivec3 texel, uvec2 record) {
@@ -112,9 +128,9 @@ void store(ivec3 texel, uvec2 record) {
 }
 
 void store_pair(Item item, uint offset, uvec4 records) {
-    uvec2 address = texelFetch(addresses, int((item.place.x + offset) >> 1)).xy;
-    store(texel_of(address.x), records.xy);
-    store(offset + 1u < item.place.y ? texel_of(address.y) : nowhere, records.zw);
+    uvec2 place = texelFetch(places, int((item.batch.x + offset) >> 1)).xy;
+    store(texel_of(item, place.x), records.xy);
+    store(offset + 1u < receiver_count(item) ? texel_of(item, place.y) : nowhere, records.zw);
 }
 
 void main() {
@@ -122,14 +138,12 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint index = group * (gl_WorkGroupSize.x / lanes_per_item) + gl_LocalInvocationIndex / lanes_per_item;
     if (index >= dispatch.item_count) return;
-    Item item;
-    item.work = texelFetch(work, int(dispatch.first_item + index));
-    item.place = texelFetch(places, int(item.work.x));
+    Item item = load_item(dispatch.first_item + index);
 
     uvec4 term[specialised_max];
     for (int t = 0; t < terms_on; ++t) term[t] = load_term(item, uint(t));
     uint lane = gl_LocalInvocationIndex % lanes_per_item;
-    for (uint offset = lane * receivers_per_lane; offset < item.place.y;
+    for (uint offset = lane * receivers_per_lane; offset < receiver_count(item);
          offset += lanes_per_item * receivers_per_lane) {
         store_pair(item, offset, terms_on < 0 ? blend_pair_loop(item, offset) : blend_pair(item, offset, term));
     }

@@ -28,6 +28,8 @@ void addBenchCommand(CLI::App& app, int& exit_code);
 void addSynthCommand(CLI::App& app, int& exit_code);
 void addVerifyCommand(CLI::App& app, int& exit_code);
 void addReferenceCommand(CLI::App& app, int& exit_code);
+void addExplainCommand(CLI::App& app, int& exit_code);
+void addExportCommand(CLI::App& app, int& exit_code);
 
 // Prints the message to stderr; the exit code that belongs to it.
 int reportError(const Error& error);

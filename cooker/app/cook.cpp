@@ -2,6 +2,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
+#include <pipeline/write_level.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
@@ -15,6 +16,8 @@ namespace {
 struct Arguments {
     CookOptions options;
     std::string json;
+    std::string write_level;
+    bool suggest_combinations = false;
 };
 
 std::string share(uint64_t bytes, uint64_t budget) {
@@ -76,14 +79,19 @@ int run(const Arguments& a) {
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
+    if (!a.write_level.empty())
+        if (auto ok = checkWritable(a.write_level); !ok) return reportError(ok.error());
     TerminalProgress progress;
-    const auto result = cook(a.options, progress);
+    auto result = cook(a.options, progress);
     if (!result) return reportError(result.error());
+    if (!a.write_level.empty())
+        if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)
+            return reportError(ok.error());
     for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack), *profile);
-    if (a.json != "-" && a.options.suggest_combinations)
+    if (a.json != "-" && a.suggest_combinations)
         fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
     return exit_done;
 }
@@ -106,8 +114,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
         ->capture_default_str();
     c->add_flag(
-        "--suggest-combinations", a->options.suggest_combinations,
-        "measure which pairs of doors lose light that needs both, warn, and print them for dimmer_combinations");
+        "--suggest-combinations", a->suggest_combinations,
+        "print the pairs of doors that lose light which needs both (each a warning, too) for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
     c->add_option("--grid-baseline", a->options.grid_baseline,
@@ -117,6 +125,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
+    c->add_option("--write-level", a->write_level,
+                  "write the level there as .glb, its meshes with the final lightmap UVs in TEXCOORD_1");
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

@@ -2,6 +2,7 @@
 #include <format/layout.h>
 #include <pack/pack_data.h>
 #include <pipeline/budget.h>
+#include <pipeline/contribution_text.h>
 
 #include <fmt/format.h>
 
@@ -22,16 +23,6 @@ struct Arguments {
 
 bool isDoor(const PackData& d, uint32_t element) {
     return d.elements[element].kind == ElementKind::Door;
-}
-
-std::string lightName(const PackData& d, const Contribution& c) {
-    return c.light_set ? d.elements[*c.light_set].name : "always";
-}
-
-std::vector<std::string> names(const PackData& d, const std::vector<uint32_t>& elements) {
-    std::vector<std::string> out;
-    for (uint32_t e : elements) out.push_back(d.elements[e].name);
-    return out;
 }
 
 // {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, and
@@ -146,8 +137,8 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     j["contributions"] = nlohmann::ordered_json::array();
     for (const Contribution& c : d.contributions)
         j["contributions"].push_back({{"light", lightName(d, c)},
-                                      {"doors_open", names(d, c.doors_open)},
-                                      {"doors_closed", names(d, c.doors_closed)},
+                                      {"doors_open", elementNames(d, c.doors_open)},
+                                      {"doors_closed", elementNames(d, c.doors_closed)},
                                       {"receivers", c.receivers},
                                       {"bytes", uint64_t{c.receivers} * sizeof(TexelRecord)},
                                       {"energy_dropped", c.energy_dropped}});

@@ -56,6 +56,8 @@ int main(int argc, char** argv) {
     addSynthCommand(app, exit_code);
     addVerifyCommand(app, exit_code);
     addReferenceCommand(app, exit_code);
+    addExplainCommand(app, exit_code);
+    addExportCommand(app, exit_code);
     if (!isCommand(app, argc, argv)) return exit_bad_input;
     try {
         endCleanlyOnInterrupt();

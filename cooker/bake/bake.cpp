@@ -1,6 +1,7 @@
 #include <bake/bake.h>
 
 #include <bake/denoise.h>
+#include <bake/door_pairs.h>
 #include <bake/final_gather.h>
 #include <bake/series.h>
 #include <probes/grid_bake.h>
@@ -62,6 +63,7 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
     Series series = expandSeries(gatherer, settings, progress);
     Baked out;
     out.rays = series.rays;
+    out.dependent_doors = dependentDoors(gatherer, series, settings, progress);
     out.light = gatherAll(gatherer, series, settings, progress, out.rays);
     out.terms = paths.terms();
     out.reports = series.reports;

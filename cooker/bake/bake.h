@@ -67,6 +67,14 @@ struct BakedGrid {
     double free_volume_m3 = 0;     // of the level: what lies in the open
 };
 
+// Two doors whose light needs both, while no combination covers them.
+struct DoorPair {
+    uint32_t first = 0, second = 0;  // into Scene::doors
+    // Luminous flux over paths that need both doors, over that which needs only the one of the two with less: what is
+    // lost without the combination.
+    float loss = 0;
+};
+
 struct Baked {
     Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
     std::vector<Term> terms;          // as DoorPaths lists them
@@ -74,6 +82,7 @@ struct Baked {
     BakedGrid grid;
     uint32_t bounces = 0;
     uint64_t rays = 0;
+    std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
 };
 

@@ -9,21 +9,17 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t measuring_rays = 8;
+// The flux over a whole level is measured: so many rays in all, within limits per texel.
+constexpr size_t measuring_rays = 200'000;
+constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
 
 using Pair = std::pair<uint32_t, uint32_t>;
 
-BakeSettings few(BakeSettings settings) {
-    settings.series_rays = std::min(settings.series_rays, measuring_rays);
+BakeSettings few(BakeSettings settings, size_t texels) {
+    const size_t rays = std::clamp(measuring_rays / texels, texel_rays_min, texel_rays_max);
+    settings.series_rays = std::min(settings.series_rays, static_cast<uint32_t>(rays));
     settings.emitter_samples = 1;
     return settings;
-}
-
-Series seriesOf(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const DoorPaths& paths,
-                const BakeSettings& settings, Progress& progress) {
-    const EmitterSampler emitters(rays, meshGroups(rays.scene()));
-    const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
-    return expandSeries(gatherer, settings, progress);
 }
 
 bool covered(const Scene& scene, const Pair& pair) {
@@ -56,30 +52,28 @@ std::vector<uint32_t> doorsOf(const Term& term) {
 
 }  // namespace
 
-std::vector<DoorPair> dependentDoors(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
-                                     const BakeSettings& settings, float loss_min, Progress& progress) {
-    if (rays.scene().doors.size() < 2) return {};
-    const BakeSettings cheap = few(settings);
-    Scene named = rays.scene();
-    const auto pairs =
-        seenTogether(named, seriesOf(rays, unwrap, texels, DoorPaths(named), cheap, progress).doors_seen);
+std::vector<DoorPair> dependentDoors(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
+                                     Progress& progress) {
+    Scene named = gatherer.rays().scene();
+    const auto pairs = seenTogether(named, series.doors_seen);
     if (pairs.empty()) return {};
     for (const Pair& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
     const DoorPaths paths(named);
-    const Series series = seriesOf(rays, unwrap, texels, paths, cheap, progress);
+    const Gatherer keeping_pairs(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), gatherer.emitters(), paths);
+    const Series measured = expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress);
 
     std::vector<double> alone(named.doors.size());
     std::map<Pair, double> together;
     for (uint32_t t = 0; t < paths.termCount(); ++t) {
         const auto doors = doorsOf(paths.terms()[t]);
-        if (doors.size() == 1) alone[doors[0]] += series.reports[t].energy;
-        if (doors.size() == 2) together[{doors[0], doors[1]}] += series.reports[t].energy;
+        if (doors.size() == 1) alone[doors[0]] += measured.reports[t].energy;
+        if (doors.size() == 2) together[{doors[0], doors[1]}] += measured.reports[t].energy;
     }
     std::vector<DoorPair> found;
     for (const Pair& pair : pairs) {
         const double less = std::min(alone[pair.first], alone[pair.second]);
         const auto loss = static_cast<float>(less > 0 ? together[pair] / less : 0);
-        if (loss > loss_min) found.push_back({pair.first, pair.second, loss});
+        if (loss > settings.threshold) found.push_back({pair.first, pair.second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);
     return found;

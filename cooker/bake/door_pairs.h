@@ -1,22 +1,16 @@
 // Which pairs of doors depend on each other so much that the level should name their combination.
 #pragma once
 
-#include <bake/bake.h>
+#include <bake/series.h>
 
 #include <vector>
 
 namespace dimmer::cook {
 
-struct DoorPair {
-    uint32_t first = 0, second = 0;  // into Scene::doors
-    // Luminous flux over paths that need both doors, over that which needs only the one of the two with less: what is
-    // lost without the combination.
-    float loss = 0;
-};
-
-// The pairs that some surface sees together, that no combination covers and whose loss is above `loss_min`, the largest
-// loss first. Measured by a series of few rays with those pairs kept: a few per cent of a bake.
-std::vector<DoorPair> dependentDoors(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
-                                     const BakeSettings& settings, float loss_min, Progress& progress);
+// The pairs that some surface sees together, that no combination covers and whose loss is above the threshold, the
+// largest loss first. `series` is the bake's own. Measured by another of few rays with those pairs kept; where no pair
+// is seen, it costs nothing.
+std::vector<DoorPair> dependentDoors(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
+                                     Progress& progress);
 
 }  // namespace dimmer::cook

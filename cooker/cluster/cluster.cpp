@@ -2,6 +2,7 @@
 
 #include <encode/encode.h>
 #include <encode/encode_probe.h>
+#include <pack/batches.h>
 
 #include <algorithm>
 #include <functional>
@@ -37,30 +38,33 @@ size_t pageIndex(const PackData& pack, uint32_t address) {
            TexelAddress::x(address);
 }
 
-// Items (texels or probes, in the order that clusters keep) by the contributions that their light has.
+// Items (texels or probes, in the order that clusters keep) by the contributions that their light has, and by page.
 class Grouping {
    public:
     template <class Light>
-    void add(uint32_t item, std::span<const LightOfTerm<Light>> light, std::span<const uint32_t> contribution_of_term) {
-        signature_.clear();
+    void add(uint32_t item, uint32_t page, std::span<const LightOfTerm<Light>> light,
+             std::span<const uint32_t> contribution_of_term) {
+        signature_ = {{}, page};
         for (const auto& l : light)
-            if (l.term != always_group) signature_.push_back(contribution_of_term[l.term]);
-        if (!signature_.empty()) members_[signature_].push_back(item);
+            if (l.term != always_group) signature_.first.push_back(contribution_of_term[l.term]);
+        if (!signature_.first.empty()) members_[signature_].push_back(item);
     }
 
     // Clusters by their number of contributions, as updates take them, and in their items' order among equals: what a
     // dispatch reads lies together, and neighbours in the file are neighbours on the page.
-    using Entry = std::pair<const std::vector<uint32_t>, std::vector<uint32_t>>;
+    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
+    using Entry = std::pair<const Signature, std::vector<uint32_t>>;
     std::vector<const Entry*> ordered() const {
         std::vector<const Entry*> order;
         for (const Entry& cluster : members_) order.push_back(&cluster);
-        std::ranges::sort(order, {}, [](const Entry* c) { return std::pair(c->first.size(), c->second.front()); });
+        std::ranges::sort(order, {},
+                          [](const Entry* c) { return std::pair(c->first.first.size(), c->second.front()); });
         return order;
     }
 
    private:
-    std::map<std::vector<uint32_t>, std::vector<uint32_t>> members_;  // contributions -> items
-    std::vector<uint32_t> signature_;
+    std::map<Signature, std::vector<uint32_t>> members_;  // -> items
+    Signature signature_;
 };
 
 // What clusters of one kind of receiver are told by.
@@ -74,15 +78,15 @@ struct Tables {
 };
 
 void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receivers, auto& tables,
-                   std::vector<uint32_t>& record_counts) {
+                   std::vector<uint32_t>& record_counts, auto&& cut) {
     Cluster c{.first_receiver = static_cast<uint32_t>(tables.receivers.size()) - receivers,
               .receiver_count = receivers,
               .first_batch = static_cast<uint32_t>(tables.batches.size()),
               .batch_count = 0,
               .first_term = static_cast<uint32_t>(tables.terms.size()),
               .term_count = static_cast<uint32_t>(contributions.size())};
-    for (uint32_t first = 0; first < receivers; first += batch_receivers_max, ++c.batch_count)
-        tables.batches.push_back({c.first_receiver + first, std::min(batch_receivers_max, receivers - first)});
+    cut(c.first_receiver, receivers);
+    c.batch_count = static_cast<uint32_t>(tables.batches.size()) - c.first_batch;
     for (uint32_t k : contributions) {
         tables.terms.push_back({k, record_counts[k]});  // relative to the contribution for now
         record_counts[k] += receivers;
@@ -90,12 +94,12 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
     tables.clusters.push_back(c);
 }
 
-// `receiverOf(item)`: its address or number; `lightOf(item)`: its row; `encode(light)`: a record. Returns the number of
-// records per contribution.
+// `receiverOf(item)`: its address or number; `lightOf(item)`: its row; `encode(light)`: a record; `cut(first, count)`
+// appends the batches of a cluster's receivers. Returns the number of records per contribution.
 template <class Record>
 std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions,
                                  std::span<const uint32_t> contribution_of_term, Tables<Record> tables,
-                                 auto&& receiverOf, auto&& lightOf, auto&& encode) {
+                                 auto&& receiverOf, auto&& lightOf, auto&& encode, auto&& cut) {
     std::vector<uint32_t> record_counts(contributions, 0);
     std::vector<std::vector<Record>> payloads(contributions);
     for (const auto* cluster : grouping.ordered()) {
@@ -104,7 +108,7 @@ std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions,
             for (const auto& l : lightOf(item))
                 if (l.term != always_group) payloads[contribution_of_term[l.term]].push_back(encode(l.light));
         }
-        appendCluster(cluster->first, static_cast<uint32_t>(cluster->second.size()), tables, record_counts);
+        appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), tables, record_counts, cut);
     }
     std::vector<uint32_t> first_record;
     for (const auto& payload : payloads) {
@@ -125,7 +129,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     Grouping grouping;
     for (uint32_t t = 0; t < targets.size(); ++t) {
         const auto row = baked.light.row(targets[t].source);
-        grouping.add(t, row, contribution_of_term);
+        grouping.add(t, TexelAddress::page(targets[t].address), row, contribution_of_term);
         for (const ReceiverLight& l : row)
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
@@ -134,7 +138,8 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
         grouping, pack.contributions.size(), contribution_of_term,
         {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
-        [&](const Gathered& light) { return encodeTexel(light, encoding); });
+        [&](const Gathered& light) { return encodeTexel(light, encoding); },
+        [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
     for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
 }
 
@@ -145,7 +150,7 @@ void buildProbeClusters(const BakedGrid& baked, std::span<const uint32_t> contri
     probes.base.assign(baked.light.rows(), encodeProbe({}, encoding));
     Grouping grouping;
     for (uint32_t i = 0; i < baked.light.rows(); ++i) {
-        grouping.add(i, baked.light.row(i), contribution_of_term);
+        grouping.add(i, 0, baked.light.row(i), contribution_of_term);
         for (const ProbeTermLight& l : baked.light.row(i))
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
     }
@@ -153,7 +158,11 @@ void buildProbeClusters(const BakedGrid& baked, std::span<const uint32_t> contri
         grouping, pack.contributions.size(), contribution_of_term,
         {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{},
         [&](uint32_t i) { return baked.light.row(i); },
-        [&](const ProbeLight& light) { return encodeProbe(light, encoding); });
+        [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
+        [&](uint32_t first, uint32_t count) {
+            for (uint32_t done = 0; done < count; done += batch_receivers_max)
+                probes.batches.push_back({first + done, std::min(batch_receivers_max, count - done)});
+        });
     probes.global = baked.grid;
 }
 

@@ -11,10 +11,10 @@
 namespace dimmer::cook {
 namespace {
 
-// Of a lone lamp 0.01 is enough; at 1, 1 / (1 + 36) of the second band is left, and no light that is nowhere negative
-// goes below 0.
-constexpr float window_first = 1.0f / 512, window_last = 1;
-constexpr int start_normals = 48, descent_steps = 24;
+// What rounding to 1/127 may take below 0 again, a little more of the mean takes back.
+constexpr float retreat = 0.97f;
+constexpr int retreats_max = 64;
+constexpr int start_normals = 64, starts_kept = 6, descent_steps = 12, newton_steps = 24;
 
 // Irradiance on n as c + b.n + n.A n, A symmetric (Ramamoorthi and Hanrahan 2001, equation 12).
 struct Quadric {
@@ -35,7 +35,8 @@ Quadric quadricOf(const ProbeLight& light, int channel) {
     return q;
 }
 
-// n -> the minimum of the quadric's tangent there, with the largest curvature taken off so that each step descends.
+// Each step goes to the minimum of a bound from above that touches the quadric at n, so it never climbs; Newton's
+// method on the sphere does the last digits.
 float descend(const Quadric& q, glm::vec3 n, float shift) {
     for (int step = 0; step < descent_steps; ++step) {
         const glm::vec3 towards = shift * n - q.a * n - 0.5f * q.b;
@@ -43,7 +44,23 @@ float descend(const Quadric& q, glm::vec3 n, float shift) {
         if (!(length > 0)) break;
         n = towards / length;
     }
-    return q.at(n);
+    float least = q.at(n), damping = 0.1f * shift;
+    for (int step = 0; step < newton_steps && damping < 1e3f * shift; ++step) {
+        const glm::vec3 gradient = 2.0f * (q.a * n) + q.b;
+        const float along = glm::dot(gradient, n);
+        const glm::mat3 tangent = glm::mat3(1) - glm::outerProduct(n, n);
+        const glm::mat3 curvature = tangent * (2.0f * q.a + (damping - along) * glm::mat3(1)) * tangent;
+        const glm::vec3 next =
+            glm::normalize(n - glm::inverse(curvature + shift * glm::outerProduct(n, n)) * (gradient - along * n));
+        if (q.at(next) < least) {
+            n = next;
+            least = q.at(n);
+            damping *= 0.2f;
+        } else {  // too far, or uphill where the quadric is not convex
+            damping *= 5;
+        }
+    }
+    return least;
 }
 
 bool negativeSomewhere(const ProbeLight& light) {
@@ -80,16 +97,25 @@ float leastIrradiance(const ProbeLight& light, int channel) {
         const auto n = uniformSphereDirection(sequence2d(static_cast<uint32_t>(i), 7));
         starts[static_cast<size_t>(i)] = {q.at(n), n};
     }
-    std::ranges::partial_sort(starts, starts.begin() + 4, {}, [](const auto& s) { return s.first; });
+    std::ranges::partial_sort(starts, starts.begin() + starts_kept, {}, [](const auto& s) { return s.first; });
     float least = std::numeric_limits<float>::infinity();
-    for (size_t i = 0; i < 4; ++i) least = std::min(least, descend(q, starts[i].second, shift));
+    for (size_t i = 0; i < starts_kept; ++i) least = std::min(least, descend(q, starts[i].second, shift));
     return least;
 }
 
-ProbeLight windowed(const ProbeLight& light, float strength) {
-    ProbeLight out = light;
-    for (size_t i = 1; i < sh_count; ++i) out.radiance[i] /= 1 + strength * (bandOf(i) == 1 ? 4.0f : 36.0f);
+ProbeLight flattened(const ProbeLight& light, float share) {
+    ProbeLight out = light * share;
+    out.radiance[0] = light.radiance[0];
     return out;
+}
+
+float positiveShare(const ProbeLight& light) {
+    float share = 1;
+    for (int channel = 0; channel < 3; ++channel) {
+        const float mean = light.irradiance()[channel], least = leastIrradiance(light, channel);
+        if (least < 0) share = std::min(share, mean / (mean - least));
+    }
+    return std::max(share, 0.0f);
 }
 
 ProbeLight decodeProbe(const ProbeRecord& record, const ProbeEncoding& encoding) {
@@ -107,12 +133,12 @@ ProbeLight decodeProbe(const ProbeRecord& record, const ProbeEncoding& encoding)
 }
 
 ProbeRecord encodeProbe(const ProbeLight& light, const ProbeEncoding& encoding) {
-    ProbeRecord record = encodePlain(light, encoding);
-    for (float strength = window_first; strength <= window_last; strength *= 1.5f) {
-        if (!negativeSomewhere(decodeProbe(record, encoding))) return record;
-        record = encodePlain(windowed(light, strength), encoding);
+    float share = positiveShare(light);
+    ProbeRecord record = encodePlain(flattened(light, share), encoding);
+    for (int i = 0; i < retreats_max && negativeSomewhere(decodeProbe(record, encoding)); ++i) {
+        share = i + 1 < retreats_max ? share * retreat : 0;
+        record = encodePlain(flattened(light, share), encoding);
     }
-    if (negativeSomewhere(decodeProbe(record, encoding))) record.bands = {};
     return record;
 }
 

@@ -11,8 +11,9 @@ struct ProbeEncoding {
     ColorFormat color_format = ColorFormat::R11G11B10F;
 };
 
-// Windowed as far as it takes that the decoded probe gives no normal a negative irradiance (what a lamp in one
-// direction does to two bands of harmonics); most probes need none. Any sum of such records is free of it too.
+// De-ringed: mixed with its own mean over all directions as far as it takes that the decoded probe gives no normal a
+// negative irradiance (two bands of harmonics ring about a lone lamp); most probes need nothing. Any sum of such
+// records is free of it too.
 ProbeRecord encodeProbe(const ProbeLight& light, const ProbeEncoding& encoding);
 
 // What a shader reads.
@@ -21,8 +22,11 @@ ProbeLight decodeProbe(const ProbeRecord& record, const ProbeEncoding& encoding)
 // The least irradiance over all normals, lux, of one channel.
 float leastIrradiance(const ProbeLight& light, int channel);
 
-// Coefficients of band l divided by 1 + strength l^2 (l + 1)^2: the window that keeps the Laplacian small (Sloan 2008,
-// Stupid Spherical Harmonics Tricks).
-ProbeLight windowed(const ProbeLight& light, float strength);
+// `share` of its bands 1 and 2, all of its mean.
+ProbeLight flattened(const ProbeLight& light, float share);
+
+// The largest share, 0 to 1, with which no channel is negative for any normal: as irradiance is its mean plus that
+// share of the rest, mean / (mean - least).
+float positiveShare(const ProbeLight& light);
 
 }  // namespace dimmer::cook

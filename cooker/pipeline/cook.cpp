@@ -1,7 +1,6 @@
 #include <pipeline/cook.h>
 
 #include <bake/bake.h>
-#include <bake/door_pairs.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
@@ -86,18 +85,15 @@ void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats
                                                  scene.file, scene.doors[d].name));
 }
 
-// A loss above the activity threshold is worth a word.
-void suggestCombinations(const RayScene& rays, const Unwrap& charts, const Texels& texels, const BakeSettings& settings,
-                         Progress& progress, CookStats& stats) {
-    const Scene& scene = rays.scene();
-    for (const DoorPair& pair : dependentDoors(rays, charts, texels, settings, settings.threshold, progress)) {
+void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& stats) {
+    for (const DoorPair& pair : baked.dependent_doors) {
         const std::string first = "door:" + scene.doors[pair.first].name,
                           second = "door:" + scene.doors[pair.second].name;
         stats.suggested_combinations.emplace_back(first, second);
         stats.warnings.push_back(
             fmt::format("{}: '{}' and '{}' depend on each other: {:.0f} % of the light that the lesser of them moves "
-                        "needs both, and "
-                        "is left out; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations'",
+                        "needs both, and is left out; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations' "
+                        "(--suggest-combinations prints the list)",
                         scene.file, first, second, 100 * static_cast<double>(pair.loss), first, second));
     }
 }
@@ -163,7 +159,6 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     {
         Stopwatch watch(stats, "bake");
         const BakeSettings settings = bakeSettings(profile, *quality);
-        if (quality->suggest_combinations) suggestCombinations(*rays, charts, texels, settings, progress, stats);
         baked = bake(*rays, charts, texels, settings, progress);
     }
     stats.rays = baked.rays;
@@ -178,6 +173,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         describeElements(scene, pack);
         const std::vector<uint32_t> contribution_of_term = describeContributions(scene, baked, pack);
         warnOfIdleElements(scene, baked, stats);
+        warnOfDependentDoors(scene, baked, stats);
         std::vector<float> max_weights;
         for (const Term& term : baked.terms)
             max_weights.push_back(term.group == always_group ? 1 : scene.light_sets[term.group - 1].max_weight);
@@ -204,7 +200,6 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     for (Quality* quality : {&profile->draft, &profile->preview, &profile->final}) {
         quality->per_set_passes = options.per_set_passes;
         quality->light_grid = options.light_grid;
-        quality->suggest_combinations = options.suggest_combinations;
         quality->grid_baseline = options.grid_baseline;
     }
     CookResult result;

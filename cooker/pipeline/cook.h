@@ -20,11 +20,9 @@ struct CookOptions {
     std::string quality = "preview";
     uint32_t threads = 0;         // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
-    bool suggest_combinations =
-        false;  // measure which pairs of doors the level should name; see suggested_combinations
     // To measure the global grid against: "uniform" (a lattice of as many probes), "unfitted" (light as traced at the
     // probes themselves) or "unseen" (no tables of what probes see); empty: as it should be.
-    std::string grid_baseline;
+    std::string grid_baseline = {};
     bool light_grid = true;  // false: shadow rays to every light from everywhere, see BakeSettings
 };
 
@@ -34,7 +32,7 @@ struct CookStats {
     uint32_t bounces = 0;
     double free_volume_m3 = 0;  // of the level, where probes may stand
     uint64_t peak_bytes = 0;    // of the whole process
-    // For `dimmer_combinations`: names of doors as the level writes them. Empty unless asked for.
+    // For `dimmer_combinations`: pairs of doors, as the level writes them, that lose light for want of it.
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;
 };

@@ -15,19 +15,18 @@ const char* nameOf(ColorFormat format);
 const char* nameOf(DirectionModel model);
 
 struct Quality {
-    uint32_t samples_per_texel = 4;     // points of a texel that rays start from
-    uint32_t series_rays = 32;          // per texel, for the bounces
-    uint32_t rays = 128;                // per texel and light group at most, for what is stored
-    uint32_t emitter_samples = 8;       // per 32 rays, towards each light group's emitters
-    float noise = 0;                    // rays end when the 95 % interval is within this share of the light; 0: never
-    uint32_t denoise = 0;               // 1: filter the noise that is left
-    uint32_t probe_sites = 16;          // per probe of the global grid, see GridSettings
-    uint32_t bounces = 64;              // at most
-    float tolerance = 0.002f;           // bounces stop when what is still to come is below this share of the sum
-    bool per_set_passes = false;        // see BakeSettings; from the command line alone
-    bool light_grid = true;             // likewise
-    bool suggest_combinations = false;  // likewise; see CookOptions
-    std::string grid_baseline = {};     // likewise
+    uint32_t samples_per_texel = 4;  // points of a texel that rays start from
+    uint32_t series_rays = 32;       // per texel, for the bounces
+    uint32_t rays = 128;             // per texel and light group at most, for what is stored
+    uint32_t emitter_samples = 8;    // per 32 rays, towards each light group's emitters
+    float noise = 0;                 // rays end when the 95 % interval is within this share of the light; 0: never
+    uint32_t denoise = 0;            // 1: filter the noise that is left
+    uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
+    uint32_t bounces = 64;           // at most
+    float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
+    bool per_set_passes = false;     // see BakeSettings; from the command line alone
+    bool light_grid = true;          // likewise
+    std::string grid_baseline = {};  // likewise; see CookOptions
 };
 
 struct Profile {

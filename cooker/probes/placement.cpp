@@ -22,14 +22,14 @@ namespace {
 
 // On average over the free space: the grid need not be denser to be as right as lightmaps are.
 constexpr double density_max_per_m3 = 1;
-// Of small levels more sites are cheap.
-constexpr double sites_min = 2000;
+// Small levels can have more, and need it, as single probes matter.
+constexpr double small_sites_per_probe = 40, small_sites = 4000;
 constexpr uint32_t sites_max = 60000;
 constexpr uint32_t first_look = 2000;  // sites that tell how much of the level is free
-constexpr float coarse_spacing_m = 4;  // of the first probes, in min_spacing
+constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
-constexpr double growth = 0.2;         // of the number of probes in a round, at most
-constexpr uint32_t grow_rounds_max = 48;
+constexpr double growth = 0.1;         // of the number of probes in a round, at most
+constexpr uint32_t grow_rounds_max = 64;
 // The more sites there are to a probe, the more rounds of exchange find better ones among them.
 constexpr size_t sites_per_exchange = 2, exchange_rounds_max = 16;
 constexpr size_t exchange_part = 5;        // one in so many is exchanged
@@ -61,6 +61,9 @@ class Placer {
             if (auto ok = grow(); !ok) return std::unexpected(ok.error());
             if (auto ok = exchange(); !ok) return std::unexpected(ok.error());
         }
+        // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
+        out_.sites.resize(first_corner_);
+        out_.light.resize(first_corner_);
         return std::move(out_);
     }
 
@@ -166,8 +169,9 @@ class Placer {
         const auto most = static_cast<double>(settings_.probes_max);
         // The box's corners are probes too.
         limit_ = static_cast<size_t>(std::clamp(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0, most));
-        const auto count = static_cast<uint32_t>(
-            std::clamp(settings_.sites * static_cast<double>(limit_), sites_min, static_cast<double>(sites_max)));
+        const auto probes = static_cast<double>(limit_);
+        const double wanted = std::max(settings_.sites * probes, std::min(small_sites_per_probe * probes, small_sites));
+        const auto count = static_cast<uint32_t>(std::min(wanted, static_cast<double>(sites_max)));
         places_ = sites_.choose(count, share);
         if (places_.empty()) return {};
         first_corner_ = places_.size();
@@ -216,19 +220,26 @@ class Placer {
         for (uint32_t i = 0; i < first_corner_ && probes_.size() < limit_; ++i) add(i, coarse_spacing_m);
     }
 
-    // The sites nearest to the points of a lattice: as even as sites are.
+    // The sites nearest to the points of a lattice, as many points as probes may be: as even as sites are.
     void placeLattice() {
-        const double spacing = std::cbrt(out_.free_volume_m3 / static_cast<double>(limit_));
+        double spacing_m = std::cbrt(out_.free_volume_m3 / static_cast<double>(limit_));
+        std::vector<uint32_t> chosen = latticeSites(spacing_m);
+        for (; chosen.size() > limit_; chosen = latticeSites(spacing_m)) spacing_m *= 1.02;
+        for (const uint32_t site : chosen) add(site, 0);
+    }
+
+    std::vector<uint32_t> latticeSites(double spacing_m) const {
         std::map<std::array<int, 3>, std::pair<float, uint32_t>> nearest;
         for (uint32_t i = 0; i < first_corner_; ++i) {
-            const glm::dvec3 cell = glm::dvec3(places_[i]) / spacing;
-            const glm::dvec3 centre = glm::floor(cell) + 0.5;
-            const auto distance = static_cast<float>(glm::distance(cell, centre));
+            const glm::dvec3 cell = glm::dvec3(places_[i]) / spacing_m;
+            const auto distance = static_cast<float>(glm::distance(cell, glm::floor(cell) + 0.5));
             const glm::ivec3 c(glm::floor(cell));
             const auto [at, fresh] = nearest.try_emplace({c.x, c.y, c.z}, distance, i);
             if (!fresh && distance < at->second.first) at->second = {distance, i};
         }
-        for (const auto& [cell, site] : nearest) add(site.second, 0);
+        std::vector<uint32_t> sites;
+        for (const auto& [cell, site] : nearest) sites.push_back(site.second);
+        return sites;
     }
 
     Expected<void> build() {

@@ -14,8 +14,9 @@ constexpr uint32_t tries_per_site = 16;
 // One place in so many is tried near a lamp, where light changes over a hand's breadth.
 constexpr uint32_t lamp_period = 2;
 constexpr float lamp_reach_m = 0.8f;
-// Uniform over the sphere, so many leave some 5 % of noise in irradiance; a probe's light is fitted to dozens of sites.
-constexpr uint32_t site_rays = 256;
+// Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
+// sites. Small levels get more, as noise misleads where to put the few probes they have.
+constexpr size_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
 constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
 
@@ -74,6 +75,8 @@ void Sites::directAt(const GatherFrom& from, TermAccumulator<ProbeLight>& reflec
 std::vector<SiteLight> Sites::trace(std::span<const glm::vec3> places, Progress& progress) const {
     progress.stage("light at probe sites", places.size());
     std::vector<SiteLight> out(places.size());
+    const auto rays = static_cast<uint32_t>(
+        std::clamp(small_level_rays / std::max<size_t>(places.size(), 1), site_rays_min, site_rays_max));
     tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
         TermAccumulator<ProbeLight> sum(gatherer_.paths().termCount()), direct(gatherer_.paths().termCount());
         for (size_t i = range.begin(); i < range.end(); ++i) {
@@ -81,8 +84,8 @@ std::vector<SiteLight> Sites::trace(std::span<const glm::vec3> places, Progress&
             const GatherFrom from = Gatherer::atProbe(point, site_seed + static_cast<uint32_t>(i));
             directAt(from, direct, sum);
             gatherer_.gather(from,
-                             {.rays = site_rays,
-                              .emitter_samples = settings_.emitter_samples * site_rays / rays_per_round,
+                             {.rays = rays,
+                              .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
                               .seed = settings_.seed + 2,
                               .wanted_in_group = {}},
                              &series_.radiance, sum, nullptr);
@@ -90,7 +93,7 @@ std::vector<SiteLight> Sites::trace(std::span<const glm::vec3> places, Progress&
             sum.clear();
             direct.clear();
         }
-        rays_traced_ += range.size() * site_rays;
+        rays_traced_ += range.size() * rays;
         progress.advance(range.size());
     });
     return out;

@@ -39,7 +39,7 @@ Expected<std::string_view> glbJson(std::span<const unsigned char> bytes, const s
     if (const uint32_t version = littleEndian32(bytes, 4); version != 2)
         return fail(ErrorCode::BadInput, fmt::format("{}: is GLB version {}. Export it as glTF 2.0.", file, version));
     const size_t length = littleEndian32(bytes, 8);
-    if (length > bytes.size())
+    if (length < header_bytes + chunk_header_bytes || length > bytes.size())
         return truncated(fmt::format("its header says {} bytes, the file has {}", length, bytes.size()));
     for (size_t offset = header_bytes; offset < length;) {
         if (length - offset < chunk_header_bytes) return truncated("it ends inside a chunk's header");
@@ -148,6 +148,12 @@ Expected<Bytes> readFile(const std::filesystem::path& path) {
 }
 
 Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
+    auto source = readGltfSource(path);
+    if (!source) return std::unexpected(source.error());
+    return std::move(source->model);
+}
+
+Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
     const std::string file = path.string();
     const Expected<Bytes> bytes = readFile(path);
     if (!bytes) return std::unexpected(bytes.error());
@@ -170,7 +176,8 @@ Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
         if (model && !model->asset.version.starts_with("2"))
             return fail(ErrorCode::BadInput,
                         fmt::format("{}: is glTF {}. Export it as glTF 2.0.", file, oneLine(model->asset.version)));
-        return model;
+        if (!model) return std::unexpected(model.error());
+        return GltfSource{std::string(json), std::move(*model)};
     } catch (const std::bad_alloc&) {
         throw;                                 // importLevel says what that means
     } catch (const std::exception& problem) {  // the parser's JSON library throws on some malformed values

@@ -5,6 +5,7 @@
 #include <tiny_gltf.h>
 
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace dimmer::cook {
@@ -15,5 +16,12 @@ Expected<std::vector<unsigned char>> readFile(const std::filesystem::path& path)
 // Reads .glb or .gltf (told apart by content) with its buffers. Images stay encoded: bytes of external and data-URI
 // images in tinygltf::Image::image (empty when unreadable), others in their buffer view.
 Expected<tinygltf::Model> readGltf(const std::filesystem::path& path);
+
+// The same, with the JSON as it stands in the file: for writing it again without losing what the parser does not know.
+struct GltfSource {
+    std::string json;
+    tinygltf::Model model;
+};
+Expected<GltfSource> readGltfSource(const std::filesystem::path& path);
 
 }  // namespace dimmer::cook

@@ -265,6 +265,7 @@ class LevelImporter {
 
     void place(const PlacedNode& at, const MeshSettings& settings, std::optional<uint32_t> light_set, SceneMesh mesh) {
         mesh.node = nodeName(at.node);
+        mesh.gltf_node = at.node;
         mesh.lighting = settings.lighting;
         mesh.texels_per_metre = settings.texels_per_metre;
         mesh.grid_spacing_m = settings.grid_spacing_m;

@@ -50,6 +50,7 @@ enum class Lighting {
 // All primitives of one glTF node, in world space. A mirrored transform has its winding mended.
 struct SceneMesh {
     std::string node;
+    int gltf_node = -1;  // its index in the file; -1: of none
     std::vector<glm::vec3> positions_m;
     std::vector<glm::vec3> normals;            // unit; one per position
     std::vector<glm::vec2> uv0;                // for textures; empty when the file has none

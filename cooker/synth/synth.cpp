@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <format/texel.h>
+#include <pack/batches.h>
 
 #include <algorithm>
 #include <array>
@@ -82,16 +83,16 @@ void addCluster(const std::vector<uint32_t>& contributions, std::span<const uint
     Cluster cluster{.first_receiver = static_cast<uint32_t>(pack.addresses.size()),
                     .receiver_count = count,
                     .first_batch = static_cast<uint32_t>(pack.batches.size()),
-                    .batch_count = (count + batch_receivers_max - 1) / batch_receivers_max,
+                    .batch_count = 0,
                     .first_term = static_cast<uint32_t>(pack.terms.size()),
                     .term_count = static_cast<uint32_t>(contributions.size())};
-    for (uint32_t first = 0; first < count; first += batch_receivers_max)
-        pack.batches.push_back({cluster.first_receiver + first, std::min(batch_receivers_max, count - first)});
     for (uint32_t k : contributions) {
         pack.terms.push_back({k, pack.contributions[k].receivers});  // within the contribution, for now
         pack.contributions[k].receivers += count;
     }
     pack.addresses.insert(pack.addresses.end(), addresses.begin(), addresses.end());
+    cutIntoBatches(pack.addresses, cluster.first_receiver, pack.batches);
+    cluster.batch_count = static_cast<uint32_t>(pack.batches.size()) - cluster.first_batch;
     pack.clusters.push_back(cluster);
 }
 
@@ -254,8 +255,14 @@ Expected<PackData> synthesise(const SynthOptions& options) {
     for (const auto& list : addresses) sizes.push_back(static_cast<uint32_t>(list.size()));
     const auto overlaps = fitOverlaps(sizes, mean, options.clusters, std::min(overlap_max, contributions), random);
     const auto members = nearestContributions(regions, overlaps, contributions, random);
-    for (uint32_t i : byOverlap(members))
-        if (!members[i].empty() && !addresses[i].empty()) addCluster(members[i], addresses[i], pack);
+    for (uint32_t i : byOverlap(members)) {
+        if (members[i].empty()) continue;
+        for (auto left = std::span(addresses[i]); !left.empty();) {
+            const size_t count = countOnPage(left);
+            addCluster(members[i], left.first(count), pack);
+            left = left.subspan(count);
+        }
+    }
     addRecords(random, pack);
     if (options.probes) {
         addProbes(options, random, pack);

@@ -3,6 +3,8 @@
 #include <cpu/batch_blend.h>
 #include <cpu/worker_pool.h>
 #include <format/probe.h>
+#include <probes/model_slots.h>
+#include <probes/resample.h>
 #include <update/planner.h>
 
 #include <array>
@@ -91,7 +93,8 @@ void blendProbes(std::span<const WorkItem> items, const WorkList& work, const Pa
 
 }  // namespace
 
-CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads) : LightState(pack) {
+CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads, uint32_t moving_probes_max)
+    : LightState(pack, 1, moving_probes_max) {
     if (threads > 1) pool_ = std::make_unique<WorkerPool>(threads);
     const PackData& data = pack.data();
     irradiance_.resize(data.base_pages.size());
@@ -101,7 +104,8 @@ CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads) : LightState(pack) {
         irradiance_[i] = base.irradiance;
         direction_[i] = base.direction;
     }
-    probes_.resize(7 * data.probes.base.size());
+    probes_.resize(7 * (data.probes.base.size() + models().probesMax()));
+    hints_.assign(models().probesMax(), no_tetrahedron);
     for (size_t i = 0; i < data.probes.base.size(); ++i) {
         const ProbeRecord base = canonicalProbe(data.color_format, data.probes.base[i]);
         std::memcpy(&probes_[7 * i], &base, sizeof(base));
@@ -141,6 +145,15 @@ void CpuRuntime::updateProbes() {
     forItems(work, [&](std::span<const WorkItem> items) { blendProbes<format>(items, work, data, probes_); });
 }
 
+void CpuRuntime::updateModels(UpdateStats& stats) {
+    const PackData& data = pack().data();
+    for (const ResampleItem& item : models().take(0)) {
+        resampleItem(data, item, static_cast<uint32_t>(data.probes.base.size()), probes_, hints_);
+        stats.probes_resampled += item.count;
+    }
+    ++stats.dispatches;
+}
+
 UpdateStats CpuRuntime::update() {
     const auto start = std::chrono::steady_clock::now();
     const bool shared_exponent = pack().data().color_format == ColorFormat::E5B9G9R9;
@@ -158,7 +171,9 @@ UpdateStats CpuRuntime::update() {
         stats.dispatches += countDispatches(probePlanner().work());
         shared_exponent ? updateProbes<ColorFormat::E5B9G9R9>() : updateProbes<ColorFormat::R11G11B10F>();
         addProbes(probePlanner().stats(), stats);
+        models().touch(0, probePlanner().work().items);
     }
+    if (models().dirty(0)) updateModels(stats);
     stats.host_us = std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
     return stats;
 }

@@ -4,7 +4,6 @@
 #include <format/probe.h>
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
-#include <gpu/vk_struct.h>
 #include <spirv/blend_probes_comp.h>
 
 #include <cstring>
@@ -47,21 +46,11 @@ Expected<TexelBuffer> uploadStream(const VulkanContext& vulkan, Transfer& transf
                        }));
 }
 
-void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written, VkPipelineStageFlags to,
-             VkAccessFlags used) {
-    auto info = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-    info.srcAccessMask = written;
-    info.dstAccessMask = used;
-    vkCmdPipelineBarrier(commands, from, to, 0, 1, &info, 0, nullptr, 0, nullptr);
-}
-
 Expected<void> checkLimits(const VulkanContext& vulkan, const ProbeData& probes) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     const uint64_t records = probes.numbers.size() + probes.payload.size();
-    const uint64_t probe_bytes = probes.base.size() * sizeof(ProbeRecord);
-    if (records <= properties.limits.maxTexelBufferElements && probe_bytes <= properties.limits.maxStorageBufferRange)
-        return {};
+    if (records <= properties.limits.maxTexelBufferElements) return {};
     return fail(ErrorCode::Unsupported,
                 fmt::format("The pack's {} light probes with {} records exceed what this Vulkan device reads as one "
                             "buffer. Cook with wider grids or a higher activity threshold.",
@@ -71,7 +60,7 @@ Expected<void> checkLimits(const VulkanContext& vulkan, const ProbeData& probes)
 }  // namespace
 
 Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                            uint32_t set_count, Transfer& transfer) {
+                                            const ProbeAtlas& atlas, Transfer& transfer) {
     DIMMER_TRY(checkLimits(vulkan, data.probes));
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
@@ -79,8 +68,8 @@ Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const P
     blender.data_ = &data.probes;
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
-    for (uint32_t i = 0; i < set_count; ++i) DIMMER_TRY(blender.createSet(vulkan, data, planner, transfer));
-    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner));
+    for (uint32_t i = 0; i < atlas.setCount(); ++i) DIMMER_TRY(blender.createSet(vulkan, planner));
+    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, atlas));
     return blender;
 }
 
@@ -99,40 +88,29 @@ Expected<void> ProbeBlender::createTables(const VulkanContext& vulkan, const Pac
     return keep(uploadStream<6, 1>(vulkan, transfer, data, VK_FORMAT_R32_UINT), records_4_);
 }
 
-Expected<void> ProbeBlender::createSet(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                       Transfer& transfer) {
+Expected<void> ProbeBlender::createSet(const VulkanContext& vulkan, const Planner& planner) {
     Set set;
     DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
                     set.items));
     DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
                     set.terms));
-    auto probes = createBuffer(
-        vulkan, data.probes.base.size() * sizeof(ProbeRecord),
-        VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-        MemoryUse::Device);
-    if (!probes) return std::unexpected(std::move(probes.error()));
-    set.probes = std::move(*probes);
-    const std::vector<Run> all = {{0, 0, 7 * static_cast<uint32_t>(data.probes.base.size())}};
-    DIMMER_TRY(transfer.upload(set.probes.buffer.get(), set.probes.size_bytes, fillFrom(all, [&](uint32_t word) {
-                                   const ProbeRecord record =
-                                       canonicalProbe(data.color_format, data.probes.base[word / 7]);
-                                   return word % 7 == 0 ? record.light : record.bands[word % 7 - 1];
-                               })));
     sets_.push_back(std::move(set));
     return {};
 }
 
-Expected<void> ProbeBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner) {
+Expected<void> ProbeBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+                                          const ProbeAtlas& atlas) {
     std::vector<Specialisation> pipelines;
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
         pipelines.push_back({group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
                              static_cast<uint32_t>(format)});
     std::vector<KernelBinding> bindings;
-    for (const Set& set : sets_) {
+    for (uint32_t i = 0; i < sets_.size(); ++i) {
+        const Set& set = sets_[i];
         const TexelBuffer* const tables[] = {&places_,    &numbers_,  &records_16_, &records_8_,
                                              &records_4_, &set.items, &set.terms};
         for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
-        bindings.push_back(KernelBinding::ofBuffer(set.probes.buffer.get()));
+        bindings.push_back(KernelBinding::ofBuffer(atlas.buffer(i)));
     }
     auto kernel = Kernel::create(device, spirv::blend_probes_comp, bindings, sizeof(DispatchConstants), pipelines,
                                  static_cast<uint32_t>(sets_.size()));
@@ -150,10 +128,7 @@ void ProbeBlender::write(const Planner& planner, uint32_t set) {
         *terms++ = {receivers + data_->terms[term.term].first_record, term.weight_r, term.weight_g, term.weight_b};
 }
 
-uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t set,
-                                VkPipelineStageFlags stages) const {
-    constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
-    barrier(commands, stages | compute, VK_ACCESS_SHADER_WRITE_BIT, compute, VK_ACCESS_SHADER_WRITE_BIT);
+uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t set) const {
     uint32_t dispatches = 0;
     for (uint32_t i = 0; i < work_group_count; ++i) {
         const WorkGroup& group = planner.work().groups[i];
@@ -163,31 +138,13 @@ uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner
         dispatchRows(commands, (group.item_count + items_per_workgroup - 1) / items_per_workgroup, groups_x_max_);
         ++dispatches;
     }
-    barrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, stages | VK_PIPELINE_STAGE_TRANSFER_BIT,
-            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT);
     return dispatches;
 }
 
 uint64_t ProbeBlender::deviceBytes() const {
     uint64_t bytes = bytesOf({&places_, &numbers_, &records_16_, &records_8_, &records_4_});
-    for (const Set& set : sets_) bytes += bytesOf({&set.items, &set.terms}) + set.probes.size_bytes;
+    for (const Set& set : sets_) bytes += bytesOf({&set.items, &set.terms});
     return bytes;
-}
-
-Expected<std::vector<uint32_t>> ProbeBlender::read(uint32_t set, Transfer& readback) const {
-    std::vector<uint32_t> words(sets_[set].probes.size_bytes / sizeof(uint32_t));
-    const VkDeviceSize bytes = sets_[set].probes.size_bytes;
-    for (VkDeviceSize offset = 0; offset < bytes; offset += Transfer::staging_bytes) {
-        const VkBufferCopy region{
-            .srcOffset = offset, .dstOffset = 0, .size = std::min(Transfer::staging_bytes, bytes - offset)};
-        DIMMER_TRY(readback.run([&](VkCommandBuffer commands) {
-            vkCmdCopyBuffer(commands, probes(set), readback.staging().buffer.get(), 1, &region);
-            barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
-                    VK_ACCESS_HOST_READ_BIT);
-        }));
-        std::memcpy(reinterpret_cast<std::byte*>(words.data()) + offset, readback.staging().mapped, region.size);
-    }
-    return words;
 }
 
 }  // namespace dimmer

@@ -13,14 +13,17 @@ Expected<RecordStore> RecordStore::create(const VulkanContext& vulkan, const Pac
     store.first_.resize(data.contributions.size());
     store.counts_.resize(data.contributions.size());
     store.runs_.resize(data.contributions.size());
-    for (const Cluster& cluster : data.clusters)
+    uint32_t place = 0;
+    for (const Cluster& cluster : data.clusters) {
         for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
             const ClusterTerm& term = data.terms[t];
             const auto within = static_cast<uint32_t>(store.counts_[term.contribution]);
-            store.within_.push_back(within);
+            store.within_.push_back(within - place);
             store.runs_[term.contribution].push_back({within, term.first_record, cluster.receiver_count});
             store.counts_[term.contribution] += paddedReceivers(cluster.receiver_count);
         }
+        place += paddedReceivers(cluster.receiver_count);
+    }
     const uint64_t all = std::accumulate(store.counts_.begin(), store.counts_.end(), uint64_t{0});
     const uint64_t records = bytes_max == 0 ? all : std::min(all, bytes_max / sizeof(TexelRecord) / 2 * 2);
     auto buffer =

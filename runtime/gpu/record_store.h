@@ -31,7 +31,7 @@ class RecordStore {
     uint64_t byteCount(uint32_t contribution) const { return counts_[contribution] * sizeof(TexelRecord); }
     // Writes the contribution's records, from `offset` bytes into them.
     void fill(uint32_t contribution, uint64_t offset, std::span<std::byte> piece) const;
-    // A cluster's first record of a term of the pack.
+    // To which the place of a receiver (DevicePlaces) is added for its record of a term of the pack; wraps.
     uint32_t firstRecord(uint32_t term) const {
         return within_[term] + static_cast<uint32_t>(first_[data_->terms[term].contribution].value_or(0));
     }
@@ -42,7 +42,7 @@ class RecordStore {
     RecordPool pool_;
     std::vector<std::optional<uint64_t>> first_;  // per contribution
     std::vector<uint64_t> counts_;                // likewise, gaps included
-    std::vector<uint32_t> within_;                // per term, within its contribution
+    std::vector<uint32_t> within_;                // per term, within its contribution, less the cluster's place
     std::vector<std::vector<Run>> runs_;          // per contribution
 };
 

@@ -2,12 +2,14 @@
 
 #include <gpu/lightmap_pages.h>
 #include <gpu/probe_blender.h>
+#include <gpu/probe_resampler.h>
 #include <gpu/record_loader.h>
 #include <gpu/texel_blender.h>
 #include <gpu/texel_executor.h>
 #include <gpu/update_timer.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <probes/model_slots.h>
 
 #include <algorithm>
 #include <chrono>
@@ -49,13 +51,17 @@ void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
     VulkanContext vulkan;
-    std::vector<LightmapPages> pages;         // one set, or two that take turns
-    uint32_t page_sets = 1;                   // as asked for
-    uint32_t front = 0;                       // the set to sample
-    uint32_t target = 0;                      // the set that the last plan writes
-    std::unique_ptr<TexelExecutor> executor;  // none when the pack has no receivers
-    std::optional<ProbeBlender> probes;       // none when the pack has no probes that change
-    bool texels_planned = false, probes_planned = false;
+    std::vector<LightmapPages> pages;           // one set, or two that take turns
+    uint32_t page_sets = 1;                     // as asked for
+    uint32_t front = 0;                         // the set to sample
+    uint32_t target = 0;                        // the set that the last plan writes
+    std::unique_ptr<TexelExecutor> executor;    // none when the pack has no receivers
+    std::optional<ProbeBlender> probes;         // none when the pack has no probes that change
+    std::optional<ProbeAtlas> atlas;            // none when there are no probes
+    std::optional<GpuBuffer> grid_table;        // none when the pack has no global grid
+    std::optional<ProbeResampler> resampler;    // none without room for moving models
+    std::span<const ResampleItem> model_items;  // of the last plan
+    bool texels_planned = false, probes_planned = false, models_planned = false;
     std::optional<RecordLoader> loader;  // none in modes that load nothing later
     std::vector<LightSet> loading;       // sets whose records are on their way
     std::vector<RecordsState> records;   // per element
@@ -69,9 +75,12 @@ struct Runtime::Impl {
     ~Impl() { (void)waitForSubmitted(); }
 
     Expected<void> create(const PackData& data, const Planner& planner, const Planner* probe_planner,
-                          const RuntimeOptions& options);
-    Expected<void> createExecutors(const PackData& data, const Planner& planner, const Planner* probe_planner,
-                                   const RuntimeOptions& options, Transfer& transfer);
+                          const ModelSlots& models, const RuntimeOptions& options);
+    Expected<void> createExecutors(const PackData& data, const Planner& planner, const RuntimeOptions& options,
+                                   Transfer& transfer);
+    Expected<void> createProbes(const PackData& data, const Planner* probe_planner, const ModelSlots& models,
+                                Transfer& transfer);
+    uint32_t dispatchProbes(VkCommandBuffer commands, const Planner* probe_planner, VkPipelineStageFlags readers);
     Expected<void> createPages(const PackData& data, uint32_t count, Transfer& transfer);
     VkQueue ownQueue() const { return vulkan.compute_queue ? vulkan.compute_queue : vulkan.queue; }
     uint32_t ownFamily() const { return vulkan.compute_queue ? vulkan.compute_queue_family : vulkan.queue_family; }
@@ -81,35 +90,49 @@ struct Runtime::Impl {
 };
 
 Expected<void> Runtime::Impl::createExecutors(const PackData& data, const Planner& planner,
-                                              const Planner* probe_planner, const RuntimeOptions& options,
-                                              Transfer& transfer) {
-    if (!data.payload.empty()) {
-        auto made = createExecutor(vulkan, options, data, planner, pages, transfer);
-        if (!made) return std::unexpected(std::move(made.error()));
-        executor = std::move(*made);
-        if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
-    }
-    if (!probe_planner) return {};
-    auto made = ProbeBlender::create(vulkan, data, *probe_planner, static_cast<uint32_t>(pages.size()), transfer);
+                                              const RuntimeOptions& options, Transfer& transfer) {
+    if (data.payload.empty()) return {};
+    auto made = createExecutor(vulkan, options, data, planner, pages, transfer);
     if (!made) return std::unexpected(std::move(made.error()));
-    probes = std::move(*made);
+    executor = std::move(*made);
+    if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
     return {};
 }
 
+template <class T>
+Expected<void> keepIn(std::optional<T>& slot, Expected<T> made) {
+    if (!made) return std::unexpected(std::move(made.error()));
+    slot.emplace(std::move(*made));
+    return {};
+}
+
+Expected<void> Runtime::Impl::createProbes(const PackData& data, const Planner* probe_planner, const ModelSlots& models,
+                                           Transfer& transfer) {
+    if (data.probes.base.empty()) return {};
+    const auto set_count = static_cast<uint32_t>(pages.size());
+    DIMMER_TRY(keepIn(atlas, ProbeAtlas::create(vulkan, data, models.probesMax(), set_count, transfer)));
+    if (probe_planner) DIMMER_TRY(keepIn(probes, ProbeBlender::create(vulkan, data, *probe_planner, *atlas, transfer)));
+    if (data.probes.global.empty()) return {};
+    DIMMER_TRY(keepIn(grid_table, uploadGridTable(vulkan, data.probes.global, transfer)));
+    if (models.probesMax() == 0) return {};
+    return keepIn(resampler, ProbeResampler::create(vulkan, data, models, *atlas, grid_table->buffer.get(), transfer));
+}
+
 Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const Planner* probe_planner,
-                                     const RuntimeOptions& options) {
+                                     const ModelSlots& models, const RuntimeOptions& options) {
     auto transfer = Transfer::create(vulkan, MemoryUse::Upload);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     // What never changes needs no second set.
-    const bool changes = !data.payload.empty() || probe_planner;
+    const bool changes = !data.payload.empty() || probe_planner || models.probesMax() > 0;
     const bool twice = options.buffering == Buffering::Double && changes;
     DIMMER_TRY(createPages(data, twice ? 2 : 1, *transfer));
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
+    DIMMER_TRY(createProbes(data, probe_planner, models, *transfer));
     if (!changes) return {};
 
-    DIMMER_TRY(createExecutors(data, planner, probe_planner, options, *transfer));
+    DIMMER_TRY(createExecutors(data, planner, options, *transfer));
     if (options.timestamps) {
         auto made_timer = UpdateTimer::create(vulkan);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
@@ -145,15 +168,30 @@ void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planne
                                  bool drawing) {
     if (texels_planned) executor->write(planner, target);
     if (probes_planned) probes->write(*probe_planner, target);
+    if (models_planned) resampler->write(model_items, target);
     if (timer) timer->reset(commands);
     if (texels_planned) pages[target].beginWrites(commands, drawing);
     if (timer) timer->begin(commands);
     if (texels_planned) stats.dispatches += executor->dispatch(commands, planner, target);
-    if (probes_planned)
-        stats.dispatches += probes->dispatch(commands, *probe_planner, target, pages[target].readers(drawing));
+    if (probes_planned || models_planned)
+        stats.dispatches += dispatchProbes(commands, probe_planner, pages[target].readers(drawing));
     if (timer) timer->end(commands);
     if (texels_planned) pages[target].endWrites(commands, drawing);
     timed = timer.has_value();
+}
+
+uint32_t Runtime::Impl::dispatchProbes(VkCommandBuffer commands, const Planner* probe_planner,
+                                       VkPipelineStageFlags readers) {
+    uint32_t dispatches = 0;
+    ProbeAtlas::beginWrites(commands, readers);
+    if (probes_planned) dispatches += probes->dispatch(commands, *probe_planner, target);
+    if (models_planned) {
+        ProbeAtlas::betweenWrites(commands);
+        resampler->dispatch(commands, target);
+        ++dispatches;
+    }
+    ProbeAtlas::endWrites(commands, readers);
+    return dispatches;
 }
 
 Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner* probe_planner,
@@ -191,16 +229,17 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     impl->vulkan = vulkan;
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
     impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
-    Runtime runtime(pack, std::move(impl));
+    Runtime runtime(pack, std::move(impl), options.moving_probes_max);
     DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(),
-                                     runtime.hasProbes() ? &runtime.probePlanner() : nullptr, options));
+                                     runtime.hasProbes() ? &runtime.probePlanner() : nullptr, runtime.models(),
+                                     options));
     for (uint32_t i = 0; i < pack.elements().size() && !options.load_records; ++i)
         if (pack.elements()[i].kind == ElementKind::LightSet) runtime.hold(LightSet{i}, true);
     return runtime;
 }
 
-Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl)
-    : LightState(pack, impl->page_sets), impl_(std::move(impl)) {}
+Runtime::Runtime(const Pack& pack, std::unique_ptr<Impl> impl, uint32_t moving_probes_max)
+    : LightState(pack, impl->page_sets, moving_probes_max), impl_(std::move(impl)) {}
 Runtime::~Runtime() = default;
 Runtime::Runtime(Runtime&&) noexcept = default;
 Runtime& Runtime::operator=(Runtime&&) noexcept = default;
@@ -210,21 +249,27 @@ bool Runtime::planNext() {
     Impl& impl = *impl_;
     impl.timed = false;
     impl.stats = {};
-    impl.texels_planned = impl.probes_planned = false;
+    impl.texels_planned = impl.probes_planned = impl.models_planned = false;
     const bool in_place = impl.pages.size() == 1;
     impl.target = in_place ? 0 : impl.front ^ 1;
     Planner& next = planner(impl.target);
     if (!in_place && next.waiting()) {
         impl.texels_planned = next.planWaiting();  // of one state to its end: pages are shown when they are complete
     } else {
-        const bool current = planner(impl.front).upToDate() && (!hasProbes() || probePlanner(impl.front).upToDate());
+        const bool current = planner(impl.front).upToDate() && (!hasProbes() || probePlanner(impl.front).upToDate()) &&
+                             !models().dirty(impl.front);
         if (!in_place && current) return false;
         impl.texels_planned = next.plan();
         impl.probes_planned = hasProbes() && probePlanner(impl.target).plan();
+        if (impl.probes_planned) models().touch(impl.target, probePlanner(impl.target).work().items);
+        impl.models_planned = models().dirty(impl.target);
+        if (impl.models_planned) impl.model_items = models().take(impl.target);
     }
     impl.stats = next.stats();
     if (impl.probes_planned) addProbes(probePlanner(impl.target).stats(), impl.stats);
-    const bool any = impl.texels_planned || impl.probes_planned;
+    if (impl.models_planned)
+        for (const ResampleItem& item : impl.model_items) impl.stats.probes_resampled += item.count;
+    const bool any = impl.texels_planned || impl.probes_planned || impl.models_planned;
     // The other pages may hold the state already, when it is one of before.
     if (!any) impl.front = impl.target;
     return any;
@@ -234,6 +279,7 @@ bool Runtime::planNext() {
 void Runtime::rollback() {
     if (impl_->texels_planned) planner(impl_->target).rollback();
     if (impl_->probes_planned) probePlanner(impl_->target).rollback();
+    if (impl_->models_planned) models().rollback(impl_->target);
     impl_->timed = false;
 }
 
@@ -369,8 +415,12 @@ uint32_t Runtime::pageSet() const {
 }
 
 VkBuffer Runtime::probes(uint32_t page_set) const {
-    if (!impl_->probes) return VK_NULL_HANDLE;
-    return impl_->probes->probes(std::min(page_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+    if (!impl_->atlas) return VK_NULL_HANDLE;
+    return impl_->atlas->buffer(std::min(page_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+}
+
+VkBuffer Runtime::gridTable() const {
+    return impl_->grid_table ? impl_->grid_table->buffer.get() : VK_NULL_HANDLE;
 }
 
 DeviceFootprint Runtime::footprint() const {
@@ -385,6 +435,12 @@ DeviceFootprint Runtime::footprint() const {
         footprint.bytes += impl_->probes->deviceBytes();
         footprint.pipelines += impl_->probes->pipelineCount();
     }
+    if (impl_->atlas) footprint.bytes += impl_->atlas->deviceBytes();
+    if (impl_->grid_table) footprint.bytes += impl_->grid_table->size_bytes;
+    if (impl_->resampler) {
+        footprint.bytes += impl_->resampler->deviceBytes();
+        footprint.pipelines += impl_->resampler->pipelineCount();
+    }
     return footprint;
 }
 
@@ -393,8 +449,8 @@ Expected<Runtime::Pages> Runtime::readPages() {
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     auto pages = impl_->pages[impl_->front].read(*transfer);
-    if (!pages || !impl_->probes) return pages;
-    auto probes = impl_->probes->read(impl_->front, *transfer);
+    if (!pages || !impl_->atlas) return pages;
+    auto probes = impl_->atlas->read(impl_->front, *transfer);
     if (!probes) return std::unexpected(std::move(probes.error()));
     pages->probes = std::move(*probes);
     return pages;

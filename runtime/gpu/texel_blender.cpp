@@ -7,17 +7,20 @@
 #include <update/device_places.h>
 
 #include <algorithm>
-#include <cstring>
 
 namespace dimmer {
 namespace {
 
-// Two records or addresses to a texel of a table; a work item or term to another.
-constexpr VkFormat wide_format = VK_FORMAT_R32G32B32A32_UINT, address_format = VK_FORMAT_R32G32_UINT;
+// To a texel of a table: two records, or a term; two receivers' places; a work item.
+constexpr VkFormat wide_format = VK_FORMAT_R32G32B32A32_UINT, places_format = VK_FORMAT_R8G8_UINT,
+                   item_format = VK_FORMAT_R32G32_UINT;
 constexpr VkDeviceSize wide_bytes = 16;
 
 // 64 suits GPUs; lavapipe is within 3 % of its best from 64 to 512.
 constexpr uint32_t workgroup_size = 64, lanes_per_item = 8, items_per_workgroup = workgroup_size / lanes_per_item;
+
+// Of a TexelItem.
+constexpr uint32_t item_index_bits = 26, item_count_bits = 12;
 
 struct DispatchConstants {
     uint32_t first_item, item_count;
@@ -25,9 +28,16 @@ struct DispatchConstants {
 
 Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places, const Planner& planner) {
     const uint64_t payload_bytes = places.records * sizeof(TexelRecord);
-    const uint64_t base_bytes = uint64_t{places.receivers} * sizeof(TexelRecord);
+    const uint64_t base_bytes = places.receivers.size() * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
     const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
+    constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
+    if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("The pack has {} batches and {} terms, up to {} at a receiver; this runtime takes fewer "
+                        "than {}, {} and {}. Cook with fewer texels per metre or a higher activity threshold.",
+                        planner.itemsMax(), planner.termsMax(), planner.overlapMax(), index_end, index_end, count_end));
     if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
     return fail(ErrorCode::Unsupported,
                 fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
@@ -55,17 +65,6 @@ Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
     return {};
 }
 
-// Pairs of receivers must not straddle batches.
-Expected<void> checkBatches(const PackData& data) {
-    for (const Cluster& cluster : data.clusters)
-        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b)
-            if ((data.batches[b].first_receiver - cluster.first_receiver) % 2 != 0)
-                return fail(ErrorCode::Unsupported, fmt::format("Batch {} of the pack starts at an odd receiver of its "
-                                                                "cluster; cook the pack again.",
-                                                                b));
-    return {};
-}
-
 }  // namespace
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
@@ -73,7 +72,6 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
                                             const RuntimeOptions& options) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    DIMMER_TRY(checkBatches(data));
     DIMMER_TRY(checkLimits(properties.limits, placesOf(data), planner));
     TexelBlender blender;
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
@@ -89,15 +87,14 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
 }
 
 Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
-    const DevicePlaces places = placesOf(data);
+    DevicePlaces places = placesOf(data);
     const auto receivers = receiverRuns(data, places);
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(uint32_t), address_format,
-                                fillFrom(receivers, [&](uint32_t i) { return data.addresses[i]; })),
-                    addresses_));
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers.size() * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),
                     base_));
-    return keep(uploadTable(vulkan, transfer, places.batches, wide_format), places_);
+    places.receivers.resize((places.receivers.size() + 3) / 4 * 4);  // uploads are in words
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers, places_format), places_));
+    return keep(uploadTable(vulkan, transfer, places.batches, wide_format), batches_);
 }
 
 // Of every contribution, or of those without a light set, which nothing can load later.
@@ -115,7 +112,7 @@ Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& trans
 
 Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
     Work work;
-    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
+    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(TexelItem), item_format, MemoryUse::Upload),
                     work.items));
     DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
                     work.terms));
@@ -132,12 +129,12 @@ Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, c
     std::vector<KernelBinding> bindings;
     for (size_t i = 0; i < page_sets.size(); ++i)
         bindings.insert(bindings.end(), {
-                                            KernelBinding::ofTexels(addresses_.view.get()),
+                                            KernelBinding::ofTexels(places_.view.get()),
                                             KernelBinding::ofTexels(base_.view.get()),
                                             KernelBinding::ofTexels(records_.view()),
                                             KernelBinding::ofTexels(work_[i].items.view.get()),
                                             KernelBinding::ofTexels(work_[i].terms.view.get()),
-                                            KernelBinding::ofTexels(places_.view.get()),
+                                            KernelBinding::ofTexels(batches_.view.get()),
                                             KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
                                             KernelBinding::ofImage(page_sets[i].directionStorageView()),
                                         });
@@ -149,7 +146,7 @@ Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, c
 }
 
 uint64_t TexelBlender::deviceBytes() const {
-    uint64_t bytes = bytesOf({&addresses_, &base_, &places_}) + records_.deviceBytes();
+    uint64_t bytes = bytesOf({&places_, &base_, &batches_}) + records_.deviceBytes();
     for (const Work& work : work_) bytes += bytesOf({&work.items, &work.terms});
     return bytes;
 }
@@ -157,7 +154,10 @@ uint64_t TexelBlender::deviceBytes() const {
 void TexelBlender::write(const Planner& planner, uint32_t page_set) {
     const WorkList& work = planner.work();
     const Work& target = work_[page_set];
-    std::memcpy(target.items.buffer.mapped, work.items.data(), work.items.size_bytes());
+    auto* items = reinterpret_cast<TexelItem*>(target.items.buffer.mapped);
+    for (const WorkItem& item : work.items)
+        *items++ = {item.batch | item.term_count << item_index_bits,
+                    item.first_term | item.term_count >> 6 << item_index_bits};
     auto* terms = reinterpret_cast<WorkTerm*>(target.terms.buffer.mapped);
     for (const WorkTerm& term : work.terms)
         *terms++ = {records_.firstRecord(term.term), term.weight_r, term.weight_g, term.weight_b};

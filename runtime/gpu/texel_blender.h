@@ -10,7 +10,7 @@ namespace dimmer {
 
 class TexelBlender : public TexelExecutor {
    public:
-    // Uploads addresses, base and payload (blocking), and makes one pipeline per group of work that clusters can fall
+    // Uploads places, base and payload (blocking), and makes one pipeline per group of work that clusters can fall
     // into. Unsupported where the device's limits are too small for the pack.
     static Expected<TexelBlender> create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                          std::span<const LightmapPages> page_sets, Transfer& transfer,
@@ -36,7 +36,7 @@ class TexelBlender : public TexelExecutor {
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 
-    TexelBuffer addresses_, base_, places_;
+    TexelBuffer places_, base_, batches_;
     RecordStore records_;
     std::vector<Work> work_;  // per set of pages
     Kernel kernel_;

@@ -87,8 +87,10 @@ class Reader {
         if (header_.magic != format::magic) return bad("this is not a Dimmer pack");
         if (header_.endian_tag != format::endian_tag) return bad("the pack's byte order is not little-endian");
         if (header_.version != format::version)
-            return bad("the pack is of format version {}, this build reads version {}", header_.version,
-                       format::version);
+            return fail(ErrorCode::BadInput,
+                        fmt::format("the pack is of format version {}, this build reads version {}; cook the level "
+                                    "again with this build, or use the one that wrote the pack",
+                                    header_.version, format::version));
         if (header_.file_bytes != file_.size())
             return bad("the file has {} bytes, its header says {}", file_.size(), header_.file_bytes);
         return {};

@@ -1,6 +1,6 @@
-#include <pack/pack_data.h>
-
 #include <fmt/format.h>
+#include <pack/batches.h>
+#include <pack/pack_data.h>
 
 #include <algorithm>
 #include <cmath>
@@ -131,6 +131,21 @@ Expected<void> validateClusters(const Kind& kind) {
     return {};
 }
 
+// What lets a kernel find a batch's texels by a byte each, and take them two at a time; see pack/batches.h.
+Expected<void> validateBatchTiles(const PackData& d) {
+    for (const Cluster& c : d.clusters)
+        for (uint32_t b = c.first_batch; b < c.first_batch + c.batch_count; ++b) {
+            const Batch& batch = d.batches[b];
+            BatchTiles tiles;
+            for (uint32_t i = 0; i < batch.receiver_count; ++i)
+                if (!tiles.add(d.addresses[batch.first_receiver + i]))
+                    return bad("batch {} lies in more than {} tiles of one page", b, batch_tiles_max);
+            if (batch.receiver_count % 2 != 0 && b + 1 < c.first_batch + c.batch_count)
+                return bad("batch {} has an odd number of receivers and is not its cluster's last", b);
+        }
+    return {};
+}
+
 Expected<void> validateTexels(const PackData& d) {
     Kind kind{d.texelView(), d.addresses.size(), {}};
     for (const Contribution& c : d.contributions) kind.record_counts.push_back(c.receivers);
@@ -253,7 +268,7 @@ Expected<void> validateMeshes(const PackData& d) {
 
 Expected<void> validate(const PackData& data) {
     for (auto* check : {validatePages, validateElements, validateContributions, validateTexels, validateAddresses,
-                        validateProbes, validateGlobalGrid, validateLocalGrids, validateMeshes})
+                        validateBatchTiles, validateProbes, validateGlobalGrid, validateLocalGrids, validateMeshes})
         if (auto ok = check(data); !ok) return ok;
     return {};
 }

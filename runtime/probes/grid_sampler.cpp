@@ -59,4 +59,36 @@ std::array<float, 3> GridSampler::sample(std::array<float, 3> point_m, std::arra
     return irradiance(radiance(point_m, hint), normal);
 }
 
+Radiance GridSampler::radiance(const ModelSlot& slot, std::array<float, 3> point_m) const {
+    std::array<uint32_t, 3> low;
+    std::array<float, 3> share;
+    for (size_t i = 0; i < 3; ++i) {
+        const auto& row = slot.grid_from_world[i];
+        const float at = row[0] * point_m[0] + row[1] * point_m[1] + row[2] * point_m[2] + row[3];
+        const auto last = static_cast<float>(slot.counts[i] - 1);
+        const float inside = at > 0 ? (at < last ? at : last) : 0.0f;
+        low[i] = std::min(static_cast<uint32_t>(inside), std::max(slot.counts[i], 2u) - 2);
+        share[i] = inside - static_cast<float>(low[i]);
+    }
+    Radiance sum;
+    const PackData& data = pack_.data();
+    for (uint32_t corner = 0; corner < 8; ++corner) {
+        float weight = 1;
+        uint32_t number = slot.first_probe, stride = 1;
+        for (size_t i = 0; i < 3; ++i) {
+            const uint32_t step = corner >> i & 1;
+            weight *= step ? share[i] : 1 - share[i];
+            number += stride * (low[i] + step);
+            stride *= slot.counts[i];
+        }
+        if (weight > 0) add(probeAt(probes_, number), data.color_format, weight / data.exposure, sum);
+    }
+    return sum;
+}
+
+std::array<float, 3> GridSampler::sample(const ModelSlot& slot, std::array<float, 3> point_m,
+                                         std::array<float, 3> normal) const {
+    return irradiance(radiance(slot, point_m), normal);
+}
+
 }  // namespace dimmer

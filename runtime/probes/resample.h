@@ -3,6 +3,8 @@
 
 #include <pack/pack_data.h>
 
+#include <dimmer/work_list.glsl>
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -14,5 +16,10 @@ namespace dimmer {
 // empty.
 ProbeRecord resampleProbe(const PackData& data, std::span<const uint32_t> probes, std::array<float, 3> point_m,
                           uint32_t& tetrahedron);
+
+// The probes of an item, which stand in a lattice. `hints`: a tetrahedron per moving probe, whose numbers begin at
+// `first_moving`. The twin of shaders/resample_probes.comp.
+void resampleItem(const PackData& data, const ResampleItem& item, uint32_t first_moving, std::span<uint32_t> probes,
+                  std::span<uint32_t> hints);
 
 }  // namespace dimmer

@@ -15,9 +15,9 @@ constexpr uint32_t paddedReceivers(uint32_t receivers) {
 }
 
 struct DevicePlaces {
-    std::vector<BatchPlace> batches;
-    uint32_t receivers = 0;  // gaps included
-    uint64_t records = 0;    // likewise
+    std::vector<TexelBatch> batches;
+    std::vector<uint8_t> receivers;  // BatchTiles::add of each, gaps included
+    uint64_t records = 0;            // likewise
 };
 
 DevicePlaces placesOf(const PackData& data);
@@ -26,8 +26,7 @@ DevicePlaces placesOf(const PackData& data);
 struct DeviceBytes {
     uint64_t base_lightmap = 0;  // the page images
     uint64_t dynamic = 0;        // records of every contribution, and the base of the receivers that they touch
-    uint64_t ancillary =
-        0;  // addresses, tables, the largest work list, gaps between clusters, and the probes themselves
+    uint64_t ancillary = 0;  // places, tables, the largest work list, gaps between clusters, and the probes themselves
     uint64_t total() const { return base_lightmap + dynamic + ancillary; }
 };
 

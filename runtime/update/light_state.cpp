@@ -1,6 +1,7 @@
 #include <dimmer/light_state.h>
 
 #include <fmt/format.h>
+#include <probes/model_slots.h>
 #include <update/planner.h>
 #include <update/state_text.h>
 
@@ -91,7 +92,22 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
 
 }  // namespace
 
-LightState::LightState(const Pack& pack, uint32_t page_sets) : pack_(pack), held_(pack.elements().size()) {
+Expected<LightSet> findLightSet(const Pack& pack, std::string_view name) {
+    const auto index = lookUp(pack.elements(), ElementKind::LightSet, name);
+    if (!index) return std::unexpected(index.error());
+    return LightSet{*index};
+}
+
+Expected<Door> findDoor(const Pack& pack, std::string_view name) {
+    const auto index = lookUp(pack.elements(), ElementKind::Door, name);
+    if (!index) return std::unexpected(index.error());
+    return Door{*index};
+}
+
+LightState::LightState(const Pack& pack, uint32_t page_sets, uint32_t moving_probes_max)
+    : pack_(pack),
+      models_(std::make_unique<ModelSlots>(pack.data(), moving_probes_max, page_sets)),
+      held_(pack.elements().size()) {
     const PackData& data = pack_.data();
     const auto add = [&](const ReceiverView& receivers, std::vector<std::unique_ptr<Planner>>& planners) {
         const auto tables = std::make_shared<const PlanTables>(data, receivers);
@@ -127,15 +143,11 @@ void LightState::hold(LightSet set, bool held) {
 }
 
 Expected<LightSet> LightState::lightSet(std::string_view name) const {
-    const auto index = lookUp(pack_.elements(), ElementKind::LightSet, name);
-    if (!index) return std::unexpected(index.error());
-    return LightSet{*index};
+    return findLightSet(pack_, name);
 }
 
 Expected<Door> LightState::door(std::string_view name) const {
-    const auto index = lookUp(pack_.elements(), ElementKind::Door, name);
-    if (!index) return std::unexpected(index.error());
-    return Door{*index};
+    return findDoor(pack_, name);
 }
 
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {
@@ -184,6 +196,19 @@ Expected<void> LightState::setLimits(const UpdateLimits& limits) {
             fmt::format("A tolerance of {} quanta is neither 0 nor a positive number.", limits.tolerance_quanta));
     for (auto& planner : planners_) planner->setLimits(limits);
     return {};
+}
+
+Expected<Model> LightState::addModel(const ModelGrid& grid, const Transform& transform) {
+    return models_->add(grid, transform);
+}
+Expected<void> LightState::moveModel(Model model, const Transform& transform) {
+    return models_->move(model, transform);
+}
+Expected<void> LightState::removeModel(Model model) {
+    return models_->remove(model);
+}
+Expected<ModelSlot> LightState::modelSlot(Model model) const {
+    return models_->slot(model);
 }
 
 // A handle of another pack has no weight here; 0 is the harmless answer.

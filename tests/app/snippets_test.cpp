@@ -1,4 +1,5 @@
 // The C++ of README.md and docs/integrate.md: it compiles, it runs, and the documents quote it as it stands here.
+// (Their C stands in tests/c/c_api.c.)
 #include <app/tool_fixture.h>
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
@@ -210,7 +211,7 @@ std::map<std::string, std::string> snippetsOf(const std::string& source) {
     return snippets;
 }
 
-// The C++ blocks of a document, by the name in the comment before each.
+// The blocks of C++ and C in a document, by the name in the comment before each.
 std::map<std::string, std::string> quotesOf(const std::string& document) {
     std::map<std::string, std::string> quotes;
     std::string name;
@@ -218,8 +219,9 @@ std::map<std::string, std::string> quotesOf(const std::string& document) {
     for (const std::string& line : linesOf(document)) {
         if (line.starts_with("<!-- snippet: ")) name = line.substr(14, line.size() - 14 - 4);
         if (line.starts_with("```")) {
-            EXPECT_TRUE(line != "```cpp" || !name.empty()) << "a C++ block that nobody compiles";
-            inside = line == "```cpp";
+            const bool code = line == "```cpp" || line == "```c";
+            EXPECT_TRUE(!code || !name.empty()) << "a block that nobody compiles";
+            inside = code;
             if (!inside) name.clear();
         } else if (inside) {
             quotes[name] += line + "\n";
@@ -231,7 +233,8 @@ std::map<std::string, std::string> quotesOf(const std::string& document) {
 TEST(Snippets, DocumentsQuoteThem) {
     const std::filesystem::path root = DIMMER_SOURCE_DIR;
     auto snippets = snippetsOf(readText(root / "tests/app/snippets_test.cpp"));
-    ASSERT_EQ(snippets.size(), 9u);
+    snippets.merge(snippetsOf(readText(root / "tests/c/c_api.c")));
+    ASSERT_EQ(snippets.size(), 10u);
     for (const char* document : {"README.md", "docs/integrate.md"}) {
         const auto quotes = quotesOf(readText(root / document));
         EXPECT_FALSE(quotes.empty()) << document;

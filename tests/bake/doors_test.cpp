@@ -1,6 +1,5 @@
 // Doors in the bake: terms of light groups over open and closed doors, against scenes that leave the doors out.
 #include <bake/baked_scene.h>
-#include <bake/door_pairs.h>
 #include <bake/door_paths.h>
 #include <bake/door_rays.h>
 #include <bake/reference.h>
@@ -263,9 +262,9 @@ TEST(Doors, WhatAnOpeningUncoversIsLit) {
 TEST(Doors, PairsThatDependOnEachOtherAreFound) {
     Scene scene = corridor();
     const auto found = [](const Scene& level) {
-        const BakedScene b(level);
-        SilentProgress silent;
-        return dependentDoors(*b.rays, b.charts, b.texels, {.series_rays = 32, .final_rays = 0}, 0.01f, silent);
+        BakedScene b(level);
+        b.bake({.series_rays = 32, .final_rays = 1});
+        return b.baked.dependent_doors;
     };
     const auto pairs = found(scene);
     ASSERT_EQ(pairs.size(), 2u);

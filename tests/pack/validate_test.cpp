@@ -150,6 +150,23 @@ const Fault address_faults[] = {
     {"below its page", [](PackData& d) { d.addresses[5] = TexelAddress::pack(1, 0, 32); },
      "outside the pages, at page 1 (0, 32)"},
     {"one texel twice", [](PackData& d) { d.addresses[5] = d.addresses[77]; }, "two receivers share the texel"},
+    {"batches all over their page",
+     [](PackData& d) {
+         std::ranges::sort(d.addresses, {}, [](uint32_t a) { return std::pair(TexelAddress::x(a) % 8, a); });
+     },
+     "in more than 4 tiles of one page"},
+    {"a batch on two pages",
+     [](PackData& d) { d.addresses[d.clusters[clusterWith(d, 65, 1, 2)].first_receiver + 1] ^= 1u << 24; },
+     "in more than 4 tiles of one page"},
+    {"an odd batch within its cluster",
+     [](PackData& d) {
+         size_t b = 0;  // a full one, followed by one with room, of the same cluster
+         while (d.batches[b].receiver_count < 64 || d.batches[b + 1].receiver_count == 64) ++b;
+         --d.batches[b].receiver_count;
+         --d.batches[b + 1].first_receiver;
+         ++d.batches[b + 1].receiver_count;
+     },
+     "an odd number of receivers"},
 };
 
 const Fault mesh_faults[] = {
@@ -214,11 +231,11 @@ TEST(PackValidate, WhatIsUnusualButSound) {
     EXPECT_TRUE(validate(data).has_value());
     data.contributions.push_back({.light_set = 0, .doors_open = {}, .doors_closed = {}});  // a set that reaches nothing
     EXPECT_TRUE(validate(data).has_value());
-    // A whole cluster in batches of one: more than need be, and right.
+    // A whole cluster in batches of two: more than need be, and right.
     PackData thin = emptyPack(2, 0);
     thin.page_count = 1, thin.page_width = 16, thin.page_height = 16;
     Random random(1);
-    fillPack(thin, std::vector<ClusterPlan>{{{0, 1}, 20}}, random, 1);
+    fillPack(thin, std::vector<ClusterPlan>{{{0, 1}, 20}}, random, 2);
     EXPECT_TRUE(validate(thin).has_value());
 }
 

@@ -61,9 +61,8 @@ inline PackData withClustersReversed(const PackData& data) {
         cluster.first_term = static_cast<uint32_t>(out.terms.size());
         for (uint32_t i = 0; i < c->receiver_count; ++i)
             out.addresses.push_back(data.addresses[c->first_receiver + c->receiver_count - 1 - i]);
-        for (uint32_t first = 0; first < c->receiver_count; first += batch_receivers_max)
-            out.batches.push_back(
-                {cluster.first_receiver + first, std::min(batch_receivers_max, c->receiver_count - first)});
+        cutIntoBatches(out.addresses, cluster.first_receiver, out.batches);
+        cluster.batch_count = static_cast<uint32_t>(out.batches.size()) - cluster.first_batch;
         for (uint32_t t = c->first_term; t < c->first_term + c->term_count; ++t) {
             const ClusterTerm& term = data.terms[t];
             const uint32_t first = next[term.contribution];

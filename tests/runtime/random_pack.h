@@ -2,6 +2,7 @@
 #pragma once
 
 #include <fmt/format.h>
+#include <pack/batches.h>
 #include <pack/pack_data.h>
 
 #include <algorithm>
@@ -64,39 +65,61 @@ struct ClusterPlan {
     uint32_t receivers = 0;
 };
 
-// Fills everything that follows from elements, contributions, pages and the plans: base, addresses in random order,
-// batches, terms, and records.
+// The addresses of all texels, page by page: a page's 8x8 tiles in random order, and the texels in each tile.
+inline std::vector<uint32_t> randomAddresses(const PackData& data, Random& random) {
+    std::vector<std::vector<uint32_t>> tiles;
+    size_t page_begin = 0;
+    const auto shuffle = [&](auto begin, auto end) {
+        for (auto n = end - begin; n > 1; --n) std::swap(begin[n - 1], begin[static_cast<int64_t>(random() % n)]);
+    };
+    for (uint32_t page = 0; page < data.page_count; ++page) {
+        for (uint32_t ty = 0; ty < data.page_height; ty += 8)
+            for (uint32_t tx = 0; tx < data.page_width; tx += 8) {
+                std::vector<uint32_t>& tile = tiles.emplace_back();
+                for (uint32_t y = ty; y < std::min(ty + 8, data.page_height); ++y)
+                    for (uint32_t x = tx; x < std::min(tx + 8, data.page_width); ++x)
+                        tile.push_back(TexelAddress::pack(page, x, y));
+                shuffle(tile.begin(), tile.end());
+            }
+        shuffle(tiles.begin() + static_cast<int64_t>(page_begin), tiles.end());
+        page_begin = tiles.size();
+    }
+    std::vector<uint32_t> addresses;
+    for (const std::vector<uint32_t>& tile : tiles) addresses.insert(addresses.end(), tile.begin(), tile.end());
+    return addresses;
+}
+
+// Fills everything that follows from elements, contributions, pages and the plans: base, addresses, batches, terms, and
+// records. A cluster that reaches past its page goes on as another one.
 inline void fillPack(PackData& data, std::span<const ClusterPlan> plans, Random& random,
                      uint32_t batch_size = batch_receivers_max) {
     data.base_pages.resize(size_t{data.page_count} * data.page_width * data.page_height);
     for (TexelRecord& record : data.base_pages) record = randomRecord(random, data.exposure, data.color_format);
 
-    std::vector<uint32_t> texels(data.base_pages.size());
-    std::iota(texels.begin(), texels.end(), 0u);
-    for (size_t i = texels.size(); i > 1; --i) std::swap(texels[i - 1], texels[random() % i]);
-
-    for (const ClusterPlan& plan : plans) {
+    const std::vector<uint32_t> addresses = randomAddresses(data, random);
+    const auto addCluster = [&](const ClusterPlan& plan) {
         Cluster cluster;
         cluster.first_receiver = static_cast<uint32_t>(data.addresses.size());
         cluster.receiver_count = plan.receivers;
         cluster.first_batch = static_cast<uint32_t>(data.batches.size());
         cluster.first_term = static_cast<uint32_t>(data.terms.size());
         cluster.term_count = static_cast<uint32_t>(plan.contributions.size());
-        for (uint32_t done = 0; done < plan.receivers; done += batch_size)
-            data.batches.push_back({cluster.first_receiver + done, std::min(batch_size, plan.receivers - done)});
+        const auto first = addresses.begin() + cluster.first_receiver;
+        data.addresses.insert(data.addresses.end(), first, first + plan.receivers);
+        cutIntoBatches(data.addresses, cluster.first_receiver, data.batches, batch_size);
         cluster.batch_count = static_cast<uint32_t>(data.batches.size()) - cluster.first_batch;
-        for (uint32_t i = 0; i < plan.receivers; ++i) {
-            const uint32_t texel = texels[data.addresses.size()];
-            const uint32_t in_page = texel % (data.page_width * data.page_height);
-            data.addresses.push_back(TexelAddress::pack(texel / (data.page_width * data.page_height),
-                                                        in_page % data.page_width, in_page / data.page_width));
-        }
         for (uint32_t k : plan.contributions) {
             data.terms.push_back({k, data.contributions[k].receivers});  // within the contribution, for now
             data.contributions[k].receivers += plan.receivers;
         }
         data.clusters.push_back(cluster);
-    }
+    };
+    for (ClusterPlan plan : plans)
+        for (uint32_t left = plan.receivers; left > 0; left -= plan.receivers) {
+            plan.receivers =
+                static_cast<uint32_t>(countOnPage(std::span(addresses).subspan(data.addresses.size(), left)));
+            addCluster(plan);
+        }
 
     std::vector<uint32_t> first(data.contributions.size() + 1, 0);
     for (size_t k = 0; k < data.contributions.size(); ++k) first[k + 1] = first[k] + data.contributions[k].receivers;

@@ -1,5 +1,6 @@
 // Files that cannot be used: one clear message, never a crash.
 #include <scene/expectations.h>
+#include <scene/full_level.h>
 
 #include <cmath>
 #include <cstring>
@@ -12,28 +13,6 @@ namespace {
 
 std::vector<uint8_t> bytesOf(const std::string& text) {
     return {text.begin(), text.end()};
-}
-
-// Every kind of content in one file, so that mutations have something to hit.
-LevelFile fullLevel() {
-    LevelFile level = LevelFile::withFloor();
-    const int glow = level.addMaterial({{"name", "glow"}, {"emissiveFactor", {1, 1, 1}}});
-    level.addNode(
-        {{"name", "panel"}, {"mesh", level.addSquareMesh(glow)}, {"extras", {{"dimmer_light_set", "panels"}}}});
-    level.addNode({{"name", "door"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", "front"}}}});
-    level.addLight("lamp", {{"type", "spot"}, {"spot", json::object()}, {"intensity", 5}},
-                   {{"dimmer_light_set", "hall"}});
-    level.document["scenes"][0]["extras"] = {
-        {"dimmer_combinations", json::array({json::array({"door:front", "hall"})})},
-        {"dimmer_sky_color", {1, 1, 1}},
-        {"dimmer_sky_luminance", 10}};
-    const uint16_t target = 1;
-    const glm::vec3 value(2, 0, 0);
-    level.document["accessors"][0]["sparse"] = {
-        {"count", 1},
-        {"indices", {{"bufferView", level.addView(&target, sizeof(target))}, {"componentType", 5123}}},
-        {"values", {{"bufferView", level.addView(&value, sizeof(value))}}}};
-    return level;
 }
 
 TEST(SceneBadInput, MissingAndUnreadableFiles) {
@@ -269,6 +248,17 @@ TEST(SceneBadInput, EveryTruncationIsRefused) {
     for (size_t length = 0; length < whole.size(); length += 5)
         expectBadInput(importBytes("level.glb", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}),
                        {});
+}
+
+// Found by fuzzing: where the header counts nothing, no chunk was checked, and the JSON's length was believed.
+TEST(SceneBadInput, AGlbThatCountsLessThanItsFirstChunk) {
+    for (const uint8_t length : {0, 12, 19}) {
+        std::vector<uint8_t> bytes = fullLevel().glb();
+        bytes[8] = length;
+        bytes[9] = bytes[10] = bytes[11] = 0;
+        bytes[14] = 0xff;  // the JSON chunk claims 16 MB
+        expectBadInput(importBytes("level.glb", bytes), {"truncated", std::to_string(length) + " bytes"});
+    }
 }
 
 TEST(SceneBadInput, FlippedBitsGetAnAnswer) {

@@ -20,7 +20,8 @@ struct TexelRecord;
 class CpuRuntime : public LightState {
    public:
     // `threads`: how many blend large updates, the caller's included; the pages are the same whatever their number.
-    explicit CpuRuntime(const Pack& pack, uint32_t threads = 1);
+    // `moving_probes_max`: as in RuntimeOptions.
+    explicit CpuRuntime(const Pack& pack, uint32_t threads = 1, uint32_t moving_probes_max = 0);
     ~CpuRuntime();
     CpuRuntime(CpuRuntime&&) noexcept;
     CpuRuntime& operator=(CpuRuntime&&) noexcept;
@@ -33,7 +34,7 @@ class CpuRuntime : public LightState {
     std::span<const uint32_t> irradiancePages() const { return irradiance_; }
     std::span<const uint32_t> directionPages() const { return direction_; }
 
-    // The light probes by their number, 7 words each; see runtime/format/probe.h.
+    // The light probes by their number, 7 words each (see runtime/format/probe.h); behind the pack's those of models.
     std::span<const uint32_t> probes() const { return probes_; }
 
    private:
@@ -41,12 +42,14 @@ class CpuRuntime : public LightState {
     void updateTexels();
     template <ColorFormat format>
     void updateProbes();
+    void updateModels(UpdateStats& stats);
     void forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend);
 
     std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;
     std::vector<uint32_t> direction_;
     std::vector<uint32_t> probes_;
+    std::vector<uint32_t> hints_;    // per probe of a model: the tetrahedron that it was in
     std::vector<TexelRecord> base_;  // per receiver, in the order in which updates read it
 };
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <dimmer/error.h>
+#include <dimmer/models.h>
 #include <dimmer/pack.h>
 
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 namespace dimmer {
 
+class ModelSlots;
 class Planner;
 
 // Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack.
@@ -20,6 +22,10 @@ struct LightSet {
 struct Door {
     uint32_t element = 0;
 };
+
+// Without a runtime. NotFound names the nearest.
+Expected<LightSet> findLightSet(const Pack& pack, std::string_view name);
+Expected<Door> findDoor(const Pack& pack, std::string_view name);
 
 // How strongly a light set shines, per linear Rec.709 channel; 1 is as baked. A scalar dims, three numbers recolour.
 struct Weight {
@@ -67,19 +73,31 @@ class LightState {
     // a pass over the pack's records. Refused: a tolerance that is negative or not finite.
     Expected<void> setLimits(const UpdateLimits& limits);
 
+    // A thing that moves gets probes of its own, as many as its grid says, taken from the level's global grid by the
+    // next update, and again whenever it moved or the light around it changed. Refused, with nothing changed: a grid or
+    // transform that is not finite, a singular transform; OutOfMemory where moving_probes_max is reached. Constant time
+    // but for the number of models.
+    Expected<Model> addModel(const ModelGrid& grid, const Transform& transform);
+    Expected<void> moveModel(Model model, const Transform& transform);
+    Expected<void> removeModel(Model model);
+    // For shading; changes with the transform alone.
+    Expected<ModelSlot> modelSlot(Model model) const;
+
     Weight weight(LightSet set) const;
     float open(Door door) const;
     const Pack& pack() const { return pack_; }
 
    protected:
     // One planner per set of pages: each knows what its own pages have yet to catch up on.
-    explicit LightState(const Pack& pack, uint32_t page_sets = 1);
+    explicit LightState(const Pack& pack, uint32_t page_sets = 1, uint32_t moving_probes_max = 0);
     Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }
     const Planner& planner(uint32_t page_set = 0) const { return *planners_[page_set]; }
     // Of the light probes; none where the pack has no dynamic light on any.
     bool hasProbes() const { return !probe_planners_.empty(); }
     Planner& probePlanner(uint32_t page_set = 0) { return *probe_planners_[page_set]; }
     const Planner& probePlanner(uint32_t page_set = 0) const { return *probe_planners_[page_set]; }
+    ModelSlots& models() { return *models_; }
+    const ModelSlots& models() const { return *models_; }
     // A held set is at 0 and refuses other weights: its records are not there. Released, it is still at 0.
     void hold(LightSet set, bool held);
     Expected<void> checkSet(LightSet set) const;
@@ -90,6 +108,7 @@ class LightState {
 
     Pack pack_;
     std::vector<std::unique_ptr<Planner>> planners_, probe_planners_;
+    std::unique_ptr<ModelSlots> models_;
     std::vector<bool> held_;  // per element
 };
 
@@ -102,6 +121,7 @@ struct UpdateStats {
     uint32_t dispatches = 0;
     uint32_t clusters_put_off = 0;   // by UpdateLimits::tolerance_quanta
     uint64_t receivers_waiting = 0;  // left for later updates by UpdateLimits::receivers_max, at most
+    uint64_t probes_resampled = 0;   // of moving models
     uint64_t bytes_read = 0;
     uint64_t bytes_written = 0;
     double host_us = 0;  // planning and recording

@@ -2,6 +2,7 @@
 // the light?"), and for servers without a GPU.
 #pragma once
 
+#include <dimmer/models.h>
 #include <dimmer/pack.h>
 
 #include <array>
@@ -37,6 +38,11 @@ class GridSampler {
     // Irradiance in lux on a surface at the point, with this unit normal.
     std::array<float, 3> sample(std::array<float, 3> point_m, std::array<float, 3> normal,
                                 GridHint* hint = nullptr) const;
+
+    // The same at a place of a model, from the model's own probes, linear between them. The CPU twin of
+    // dimmer_model_irradiance in grid.glsl.
+    Radiance radiance(const ModelSlot& slot, std::array<float, 3> point_m) const;
+    std::array<float, 3> sample(const ModelSlot& slot, std::array<float, 3> point_m, std::array<float, 3> normal) const;
 
    private:
     Pack pack_;

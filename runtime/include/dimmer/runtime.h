@@ -48,6 +48,9 @@ struct RuntimeOptions {
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
     // always-on light that doors let through is loaded in any case.
     bool load_records = true;
+    // Room for the probes of moving models (LightState::addModel), in probes; 0: no models, and nothing is kept for
+    // them.
+    uint32_t moving_probes_max = 0;
     // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
 };
@@ -128,8 +131,10 @@ class Runtime : public LightState {
     LightmapImages images(uint32_t page_set) const;
     uint32_t pageSet() const;
     // The light probes that go with a set of pages, by their number, 7 words each (see runtime/format/probe.h): a
-    // storage buffer, null where the pack has no dynamic light on any.
+    // storage buffer, with those of models behind the pack's. Null where there are none. Shaders read it by grid.glsl.
     VkBuffer probes(uint32_t page_set) const;
+    // The global light grid's tables for grid.glsl, a storage buffer; null where the pack has no such grid.
+    VkBuffer gridTable() const;
     // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
     // changes anything has its pages and nothing else.
     DeviceFootprint footprint() const;
@@ -143,7 +148,7 @@ class Runtime : public LightState {
 
    private:
     struct Impl;
-    Runtime(const Pack& pack, std::unique_ptr<Impl> impl);
+    Runtime(const Pack& pack, std::unique_ptr<Impl> impl, uint32_t moving_probes_max);
     bool planNext();
     void rollback();
     const Planner* plannedProbes() const;

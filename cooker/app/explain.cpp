@@ -1,0 +1,175 @@
+#include <app/command.h>
+#include <pipeline/contribution_text.h>
+#include <pipeline/explain.h>
+#include <pipeline/sample_points.h>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <numeric>
+
+namespace dimmer::cook {
+namespace {
+
+struct Arguments {
+    std::string pack, state, json;
+    std::vector<float> point, normal;
+};
+
+std::string weightText(const Weight& w) {
+    return w.r == w.g && w.g == w.b ? fmt::format("{:.3g}", w.r) : fmt::format("{:.3g}/{:.3g}/{:.3g}", w.r, w.g, w.b);
+}
+
+std::string luxText(const std::array<float, 3>& lux) {
+    return fmt::format("{:.4g} {:.4g} {:.4g}", lux[0], lux[1], lux[2]);
+}
+
+uint64_t bytesOf(const Contribution& c) {
+    return uint64_t{c.receivers} * sizeof(TexelRecord);
+}
+
+void printPlace(const PackData& d, const Explanation& e) {
+    const Mesh& mesh = d.meshes[e.surface.mesh];
+    const glm::vec3 n = e.surface.frame.normal;
+    fmt::print("{}: page {}, texel {}, {}; {:.1f} cm from the point, facing {:.2f},{:.2f},{:.2f}\n", mesh.node,
+               mesh.page, e.texel[0], e.texel[1], 100 * static_cast<double>(e.surface.distance_m), n.x, n.y, n.z);
+    if (!e.cluster) {
+        fmt::print("no contribution is stored there: the texel never changes\n");
+        return;
+    }
+    const Cluster& c = d.clusters[*e.cluster];
+    fmt::print("cluster {} of {} receivers with {} contributions, {} of records; batch {} of {} receivers\n",
+               *e.cluster, c.receiver_count, c.term_count,
+               humanBytes((uint64_t{c.term_count} + 1) * c.receiver_count * sizeof(TexelRecord)), *e.batch,
+               d.batches[*e.batch].receiver_count);
+}
+
+// Those that light the place, the brightest first.
+std::vector<const ExplainedContribution*> byShare(const Explanation& e) {
+    std::vector<const ExplainedContribution*> order;
+    for (const ExplainedContribution& c : e.contributions)
+        if (c.stored || c.full_lux != std::array<float, 3>{}) order.push_back(&c);
+    std::ranges::stable_sort(order, [](auto* a, auto* b) { return a->share > b->share; });
+    return order;
+}
+
+void printContributions(const PackData& d, const Explanation& e) {
+    fmt::print("\n{:<40} {:>16} {:>26} {:>8} {:>6} {:>12} {:>10} {:>8}\n", "contribution", "weight", "lux (r g b)",
+               "share", "bytes", "receivers", "in all", "dropped");
+    fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6}\n", "base", 1, luxText(e.base_lux), 100 * e.base_share,
+               sizeof(TexelRecord));
+    for (const ExplainedContribution* c : byShare(e)) {
+        const Contribution& of = d.contributions[c->contribution];
+        fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6} {:>12} {:>10} {:>6.2f} %\n", describe(d, of),
+                   weightText(c->weight), luxText(c->lux), 100 * c->share, c->stored ? sizeof(TexelRecord) : 0,
+                   of.receivers, humanBytes(bytesOf(of)), 100 * static_cast<double>(of.energy_dropped));
+    }
+    fmt::print("{:<40} {:>16} {:>26}\n", "the pages", "", luxText(e.lux));
+}
+
+// What is not stored at the place: it reaches it below the threshold, or not at all.
+void printAbsent(const PackData& d, const Explanation& e) {
+    std::vector<std::string> absent;
+    for (const ExplainedContribution& c : e.contributions)
+        if (!c.stored)
+            absent.push_back(fmt::format("{} ({:.2f} %)", describe(d, d.contributions[c.contribution]),
+                                         100 * static_cast<double>(d.contributions[c.contribution].energy_dropped)));
+    if (absent.empty()) return;
+    fmt::print(
+        "\nnot stored at the texel, being below the threshold there or no light at all (in brackets what the "
+        "threshold dropped in the whole level):\n  {}\n",
+        fmt::join(absent, "\n  "));
+}
+
+nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Arguments& a) {
+    using Json = nlohmann::ordered_json;
+    const Mesh& mesh = d.meshes[e.surface.mesh];
+    const glm::vec3 n = e.surface.frame.normal;
+    Json j;
+    j["point"] = a.point;
+    j["state"] = a.state;
+    j["place"] = {{"node", mesh.node},  {"page", mesh.page},         {"texel", e.texel},
+                  {"uv", e.surface.uv}, {"normal", {n.x, n.y, n.z}}, {"distance_m", e.surface.distance_m}};
+    j["cluster"] = nullptr;
+    j["batch"] = nullptr;
+    if (e.cluster) {
+        const Cluster& c = d.clusters[*e.cluster];
+        j["cluster"] = {{"index", *e.cluster}, {"receivers", c.receiver_count}, {"contributions", c.term_count}};
+        j["batch"] = {{"index", *e.batch}, {"receivers", d.batches[*e.batch].receiver_count}};
+    }
+    j["lux"] = e.lux;
+    j["base"] = {{"lux", e.base_lux}, {"share", e.base_share}, {"bytes", sizeof(TexelRecord)}};
+    j["contributions"] = Json::array();
+    for (const ExplainedContribution& c : e.contributions) {
+        const Contribution& of = d.contributions[c.contribution];
+        j["contributions"].push_back({{"light", lightName(d, of)},
+                                      {"doors_open", elementNames(d, of.doors_open)},
+                                      {"doors_closed", elementNames(d, of.doors_closed)},
+                                      {"weight", {c.weight.r, c.weight.g, c.weight.b}},
+                                      {"lux", c.lux},
+                                      {"lux_at_weight_1", c.full_lux},
+                                      {"share", c.share},
+                                      {"stored", c.stored},
+                                      {"bytes", c.stored ? sizeof(TexelRecord) : 0},
+                                      {"receivers_in_all", of.receivers},
+                                      {"bytes_in_all", bytesOf(of)},
+                                      {"energy_dropped", of.energy_dropped}});
+    }
+    return j;
+}
+
+int run(const Arguments& a) {
+    const auto pack = Pack::open(a.pack);
+    if (!pack) return reportError(pack.error());
+    const auto finite = [](float v) { return std::isfinite(v); };
+    if (!std::ranges::all_of(a.point, finite) || !std::ranges::all_of(a.normal, finite))
+        return reportError({ErrorCode::InvalidArgument, "--point and --normal take three finite numbers each"});
+    std::optional<glm::vec3> normal;
+    if (!a.normal.empty()) {
+        const glm::vec3 n(a.normal[0], a.normal[1], a.normal[2]);
+        if (!(glm::length(n) > 1e-6f)) return reportError({ErrorCode::InvalidArgument, "--normal has no length"});
+        normal = glm::normalize(n);
+    }
+    const auto e = explain(*pack, {a.point[0], a.point[1], a.point[2]}, normal, a.state);
+    if (!e) return reportError(e.error());
+    if (!a.json.empty())
+        if (auto ok = writeJson(toJson(pack->data(), *e, a), a.json); !ok) return reportError(ok.error());
+    if (a.json == "-") return exit_done;
+    printPlace(pack->data(), *e);
+    printContributions(pack->data(), *e);
+    printAbsent(pack->data(), *e);
+    return exit_done;
+}
+
+}  // namespace
+
+void addExplainCommand(CLI::App& app, int& exit_code) {
+    auto a = std::make_shared<Arguments>();
+    auto* c = app.add_subcommand("explain", "What lights a place, and what that costs");
+    c->add_option("PACK", a->pack, "a cooked pack")->required();
+    c->add_option("--point", a->point,
+                  "x,y,z in metres, glTF axes; the nearest lightmapped surface within 10 cm counts")
+        ->required()
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--normal", a->normal,
+                  "x,y,z: light on this normal, from a surface that faces along it; default: the "
+                  "surface's own")
+        ->delimiter(',')
+        ->expected(3);
+    c->add_option("--state", a->state,
+                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1, doors 0");
+    c->add_option("--json", a->json, "write the same as JSON; - for stdout, in the table's place");
+    c->footer(
+        "Irradiance in lux of every contribution at its weight, its share of the luminance, the bytes of its record "
+        "at\n"
+        "the texel, its receivers and bytes in the whole level, and the share of its energy that the threshold\n"
+        "dropped there. Neighbouring texels take part by filtering, as in a shader.\n"
+        "Example: dimmer explain house.dimmer --point 3,0,3 --state \"alarm=0.5,door:front=1\"");
+    c->callback([a, &exit_code] { exit_code = run(*a); });
+}
+
+}  // namespace dimmer::cook

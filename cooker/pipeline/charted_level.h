@@ -1,0 +1,22 @@
+// A level as its pack has it: cut and charted by the settings of the cook.
+#pragma once
+
+#include <charts/unwrap.h>
+#include <pack/pack_data.h>
+
+#include <filesystem>
+#include <memory>
+
+namespace dimmer::cook {
+
+struct ChartedLevel {
+    Scene scene;                     // cut at walls, with open leaves
+    std::unique_ptr<RayScene> rays;  // over `scene`
+    Unwrap charts;
+};
+
+// Charts `level` again with the settings that the pack carries. An error says so where that does not give the pack's
+// own UVs: the level is another one, or was changed since.
+Expected<std::unique_ptr<ChartedLevel>> chartAgain(const std::filesystem::path& level, const PackData& pack);
+
+}  // namespace dimmer::cook

@@ -1,0 +1,288 @@
+#include <pipeline/write_level.h>
+
+#include <pipeline/charted_level.h>
+#include <scene/gltf_file.h>
+#include <scene/node_walk.h>
+#include <write/gltf_prune.h>
+#include <write/pack_writer.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <tuple>
+
+namespace dimmer::cook {
+namespace {
+
+using Json = GlbDocument::Json;
+
+// Vertices of one material, in the node's own space.
+class PrimitiveBuilder {
+   public:
+    void add(const SceneMesh& from, uint32_t vertex, std::optional<glm::vec2> uv, bool back,
+             const glm::dmat4& node_from_world) {
+        const glm::vec2 key_uv = uv.value_or(glm::vec2(0));
+        const auto [it, fresh] = index_.try_emplace({vertex, key_uv.x, key_uv.y}, static_cast<uint32_t>(index_.size()));
+        indices_.push_back(it->second);
+        if (!fresh) return;
+        push(positions_, glm::vec3(node_from_world * glm::dvec4(from.positions_m[vertex], 1)));
+        // A normal's node_from_world is the inverse transpose of a point's: the transpose of world_from_node.
+        const glm::dmat3 world_from_node = glm::inverse(glm::dmat3(node_from_world));
+        const glm::dvec3 normal = glm::transpose(world_from_node) * glm::dvec3(from.normals[vertex]);
+        push(normals_, glm::vec3(glm::normalize(back ? -normal : normal)));
+        if (!from.uv0.empty()) push(uv0_, from.uv0[vertex]);
+        if (uv) push(uv1_, *uv);
+    }
+
+    Json write(GlbDocument& document) const {
+        Json primitive = {
+            {"attributes",
+             {{"POSITION", document.addVectors(positions_, 3, true)}, {"NORMAL", document.addVectors(normals_, 3)}}}};
+        if (!uv0_.empty()) primitive["attributes"]["TEXCOORD_0"] = document.addVectors(uv0_, 2);
+        if (!uv1_.empty()) primitive["attributes"]["TEXCOORD_1"] = document.addVectors(uv1_, 2);
+        primitive["indices"] = document.addIndices(indices_);
+        return primitive;
+    }
+
+   private:
+    template <class Vector>
+    static void push(std::vector<float>& values, Vector v) {
+        for (int i = 0; i < v.length(); ++i) values.push_back(v[i]);
+    }
+    std::map<std::tuple<uint32_t, float, float>, uint32_t> index_;
+    std::vector<float> positions_, normals_, uv0_, uv1_;
+    std::vector<uint32_t> indices_;
+};
+
+// What of a node becomes one glTF mesh: a scene mesh's faces on one page, or a scene mesh that has no lightmap.
+struct Part {
+    bool emissive = false;                                             // emissive parts come first
+    std::map<std::pair<uint32_t, bool>, PrimitiveBuilder> primitives;  // by material, and whether it is the back side
+};
+using Parts = std::map<std::pair<uint32_t, uint32_t>, Part>;  // of a node, by scene mesh and page (or no_index)
+
+class LevelWriter {
+   public:
+    LevelWriter(const ChartedLevel& level, const GltfSource& source, std::vector<std::string>& warnings)
+        : level_(level), source_(source), warnings_(warnings) {}
+
+    Expected<std::vector<std::byte>> write(const std::filesystem::path& from, const std::filesystem::path& to) {
+        if (auto ok = collect(); !ok) return std::unexpected(ok.error());
+        Json original = Json::parse(source_.json);
+        for (const auto& [node, parts] : nodes_) release(original, node);
+        dropMorphAnimations(original);
+        adoptUsed(document_, std::move(original), source_.model);
+        for (auto& [node, parts] : nodes_) place(static_cast<size_t>(node), parts);
+        normaliseTextures();
+        moveReferences(from, to);
+        document_.json["asset"]["generator"] = "Dimmer";
+        return document_.bytes();
+    }
+
+   private:
+    Expected<void> collect() {
+        Scene ignored;
+        const ImportContext context{source_.model, ignored};
+        const auto placed = placeNodes(context);
+        if (!placed) return std::unexpected(placed.error());
+        for (const PlacedNode& at : *placed)
+            if (at.singular == -1) node_from_world_[at.node] = glm::inverse(at.world_from_node);
+        std::vector<bool> lit(level_.scene.meshes.size());
+        const glm::vec2 page_size(level_.charts.page_width, level_.charts.page_height);
+        for (uint32_t f = 0; f < level_.charts.faces.size(); ++f) {
+            const Face face = level_.charts.faces[f];
+            const LevelTriangle& t = level_.rays->triangles()[face.triangle];
+            lit[t.mesh] = true;
+            std::array<glm::vec2, 3> uv = level_.charts.uv_texels[f];
+            for (glm::vec2& corner : uv) corner /= page_size;
+            add(t.mesh, t.triangle, level_.charts.charts[level_.charts.face_chart[f]].page, &uv, face.back);
+        }
+        for (uint32_t m = 0; m < lit.size(); ++m)
+            for (uint32_t t = 0; !lit[m] && t < level_.scene.meshes[m].triangles.size(); ++t)
+                add(m, t, no_index, nullptr, false);
+        return {};
+    }
+
+    void add(uint32_t mesh, uint32_t triangle, uint32_t page, const std::array<glm::vec2, 3>* uv, bool back) {
+        const SceneMesh& from = level_.scene.meshes[mesh];
+        if (from.is_open_leaf) return;
+        const glm::dmat4& node_from_world = node_from_world_.at(from.gltf_node);
+        const uint32_t material = from.triangle_materials[triangle];
+        Part& part = nodes_[from.gltf_node][{mesh, page}];
+        part.emissive = part.emissive || level_.scene.materials[material].emission_cd_m2 != glm::vec3(0);
+        PrimitiveBuilder& primitive = part.primitives[{material, back}];
+        // glTF turns the triangles of mirrored nodes itself.
+        const bool mirrored = glm::determinant(glm::dmat3(node_from_world)) < 0;
+        for (const int i : back != mirrored ? std::array{0, 2, 1} : std::array{0, 1, 2}) {
+            const auto corner = uv ? std::optional((*uv)[static_cast<size_t>(i)]) : std::nullopt;
+            primitive.add(from, from.triangles[triangle][i], corner, back, node_from_world);
+        }
+    }
+
+    // The node's mesh gives way to what will be made of it.
+    void release(Json& original, int node) {
+        Json& n = original["nodes"][static_cast<size_t>(node)];
+        original_mesh_[node] = original["meshes"][n["mesh"].get<size_t>()];
+        n.erase("mesh");
+        if (n.contains("skin"))
+            warnings_.push_back(
+                fmt::format("node '{}': its skin is not written; the mesh is in its rest pose", n.value("name", "")));
+        n.erase("skin");
+        n.erase("weights");
+    }
+
+    // Channels that move morph targets which are no longer there.
+    void dropMorphAnimations(Json& original) {
+        if (!original.contains("animations")) return;
+        Json kept = Json::array();
+        for (Json& animation : original["animations"]) {
+            Json channels = Json::array();
+            for (Json& channel : animation["channels"])
+                if (channel["target"].value("path", "") != "weights") channels.push_back(std::move(channel));
+            if (channels.empty()) continue;
+            animation["channels"] = std::move(channels);
+            kept.push_back(std::move(animation));
+        }
+        original["animations"] = std::move(kept);
+    }
+
+    void place(size_t node, Parts& parts) {
+        std::vector<std::pair<std::pair<uint32_t, uint32_t>, Part*>> order;
+        for (auto& [key, part] : parts) order.emplace_back(key, &part);
+        std::ranges::stable_sort(order,
+                                 [](const auto& a, const auto& b) { return a.second->emissive > b.second->emissive; });
+        for (size_t i = 0; i < order.size(); ++i) {
+            const size_t holder = i == 0 ? node : addChild(node, i, order[i].second->emissive);
+            const size_t mesh = addMesh(node, *order[i].second, order[i].first.second);
+            document_.json["nodes"][holder]["mesh"] = mesh;
+        }
+    }
+
+    // A light set belongs to what shines.
+    static void dropLightSet(Json& extras) {
+        extras.erase("dimmer_light_set");
+        extras.erase("dimmer_max_weight");
+    }
+
+    // A door holds for what is below its node, too, and its pose is in that node's axes.
+    static void dropDoor(Json& extras) {
+        for (const char* key : {"dimmer_door", "dimmer_door_open", "dimmer_door_rotation", "dimmer_door_translation"})
+            extras.erase(key);
+    }
+
+    size_t addChild(size_t node, size_t number, bool emissive) {
+        Json& nodes = document_.json["nodes"];
+        const size_t child = nodes.size();
+        Json made = {
+            {"name", fmt::format("{}.part{}", nodes[node].value("name", fmt::format("node_{}", node)), number + 1)}};
+        if (nodes[node].contains("extras") && nodes[node]["extras"].is_object()) {
+            made["extras"] = nodes[node]["extras"];
+            dropDoor(made["extras"]);
+            if (!emissive) dropLightSet(made["extras"]);
+        }
+        nodes.push_back(std::move(made));
+        nodes[node]["children"].push_back(child);
+        return child;
+    }
+
+    size_t addMesh(size_t node, const Part& part, uint32_t page) {
+        const Json& original = original_mesh_.at(static_cast<int>(node));
+        Json mesh = {{"primitives", Json::array()}};
+        if (original.contains("name")) mesh["name"] = original["name"];
+        if (original.contains("extras") && original["extras"].is_object()) {
+            mesh["extras"] = original["extras"];
+            if (!part.emissive) dropLightSet(mesh["extras"]);
+        }
+        if (page != no_index) mesh["extras"]["lightmap_page"] = page;
+        for (const auto& [key, builder] : part.primitives) {
+            Json primitive = builder.write(document_);
+            if (const auto material = materialFor(key.first, page != no_index)) primitive["material"] = *material;
+            mesh["primitives"].push_back(std::move(primitive));
+        }
+        document_.json["meshes"].push_back(std::move(mesh));
+        return document_.json["meshes"].size() - 1;
+    }
+
+    // The file's material; a single-sided copy where each side has texels of its own. None: glTF's default.
+    std::optional<size_t> materialFor(uint32_t material, bool lit) {
+        if (material >= source_.model.materials.size()) return std::nullopt;
+        if (!lit || !level_.scene.materials[material].double_sided) return material;
+        const auto [it, fresh] = single_sided_.try_emplace(material, document_.json["materials"].size());
+        if (fresh) {
+            Json copy = document_.json["materials"][material];
+            copy["doubleSided"] = false;
+            document_.json["materials"].push_back(std::move(copy));
+        }
+        return it->second;
+    }
+
+    // TEXCOORD_0 is what the base colour's texture wants, with its transform applied.
+    void normaliseTextures() {
+        if (!document_.json.contains("materials")) return;
+        for (Json& material : document_.json["materials"]) {
+            if (!material.contains("pbrMetallicRoughness")) continue;
+            Json& pbr = material["pbrMetallicRoughness"];
+            if (!pbr.contains("baseColorTexture")) continue;
+            Json& texture = pbr["baseColorTexture"];
+            texture.erase("texCoord");
+            if (!texture.contains("extensions")) continue;
+            if (texture["extensions"].erase("KHR_texture_transform") > 0)
+                warnings_.push_back(
+                    fmt::format("material '{}': its texture's transform is in TEXCOORD_0 now; textures "
+                                "other than the base colour's may lie elsewhere",
+                                material.value("name", "")));
+            if (texture["extensions"].empty()) texture.erase("extensions");
+        }
+    }
+
+    // Files that the level names relative to itself, seen from the new place.
+    void moveReferences(const std::filesystem::path& from, const std::filesystem::path& to) {
+        const auto old_folder = std::filesystem::absolute(from).parent_path();
+        const auto new_folder = std::filesystem::absolute(to).parent_path();
+        if (old_folder == new_folder) return;
+        const auto move = [&](Json& uri) {
+            const std::string text = uri.get<std::string>();
+            if (!text.starts_with("data:")) uri = (old_folder / text).lexically_relative(new_folder).generic_string();
+        };
+        Json& d = document_.json;
+        const Json::json_pointer sky("/scenes/" + std::to_string(d.value("scene", 0)) + "/extras/dimmer_sky_image");
+        if (d.contains(sky)) move(d[sky]);
+        const Json::json_pointer ies("/extensions/EXT_lights_ies/lights");
+        if (d.contains(ies))
+            for (Json& light : d[ies])
+                if (light.contains("uri")) move(light["uri"]);
+    }
+
+    const ChartedLevel& level_;
+    const GltfSource& source_;
+    std::vector<std::string>& warnings_;
+    GlbDocument document_;
+    std::map<int, glm::dmat4> node_from_world_;
+    std::map<int, Parts> nodes_;
+    std::map<int, Json> original_mesh_;
+    std::map<uint32_t, size_t> single_sided_;
+};
+
+}  // namespace
+
+Expected<void> writeLevel(const std::filesystem::path& level, const PackData& pack, const std::filesystem::path& out,
+                          std::vector<std::string>& warnings) {
+    const auto charted = chartAgain(level, pack);
+    if (!charted) return std::unexpected(charted.error());
+    const auto source = readGltfSource(level);
+    if (!source) return std::unexpected(source.error());
+    try {
+        const auto bytes = LevelWriter(**charted, *source, warnings).write(level, out);
+        if (!bytes) return std::unexpected(bytes.error());
+        return writeFileAtomically(out, *bytes);
+    } catch (const nlohmann::json::exception& problem) {
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: cannot be written again: {}", level.string(), problem.what()));
+    } catch (const std::out_of_range&) {
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: cannot be written again: an index is out of range", level.string()));
+    }
+}
+
+}  // namespace dimmer::cook

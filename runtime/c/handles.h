@@ -1,0 +1,63 @@
+// What the C interface's handles point to, and how errors and exceptions become results.
+#pragma once
+
+#include <dimmer/cpu_runtime.h>
+#include <dimmer/dimmer.h>
+#include <dimmer/runtime.h>
+
+#include <exception>
+#include <new>
+#include <variant>
+
+struct dimmer_pack {
+    dimmer::Pack pack;
+};
+
+struct dimmer_lights {
+    std::variant<dimmer::CpuRuntime, dimmer::Runtime> runtime;
+
+    dimmer::LightState& state() {
+        return std::visit([](auto& r) -> dimmer::LightState& { return r; }, runtime);
+    }
+    const dimmer::LightState& state() const {
+        return std::visit([](const auto& r) -> const dimmer::LightState& { return r; }, runtime);
+    }
+};
+
+namespace dimmer::c {
+
+// Keeps the message for dimmer_error_message().
+dimmer_result report(ErrorCode code, const char* message) noexcept;
+inline dimmer_result report(const Error& error) noexcept {
+    return report(error.code, error.message.c_str());
+}
+
+// `call` returns a dimmer_result. No exception gets to C.
+template <class Call>
+dimmer_result guarded(Call&& call) noexcept {
+    try {
+        return call();
+    } catch (const std::bad_alloc&) {
+        return report(ErrorCode::OutOfMemory, "there is not enough memory");
+    } catch (const std::exception& problem) {
+        return report(ErrorCode::Internal, problem.what());
+    }
+}
+
+// Whether none of the pointers is null; reports it otherwise.
+template <class... Pointers>
+bool given(const Pointers*... pointers) noexcept {
+    if ((... && (pointers != nullptr))) return true;
+    report(ErrorCode::InvalidArgument, "a null pointer was passed where an object or a place for a result is needed");
+    return false;
+}
+
+// The result of an Expected<void>.
+inline dimmer_result finish(const Expected<void>& done) noexcept {
+    return done ? DIMMER_OK : report(done.error());
+}
+
+// The same with statistics, for which `out` may be null.
+dimmer_result finish(const Expected<UpdateStats>& done, dimmer_update_stats* out) noexcept;
+
+}  // namespace dimmer::c

@@ -1,0 +1,207 @@
+// The C interface to the runtimes.
+#include <c/handles.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace dimmer::c {
+
+dimmer_result finish(const Expected<UpdateStats>& done, dimmer_update_stats* out) noexcept {
+    if (!done) return report(done.error());
+    if (out)
+        *out = {.contributions_changed = done->contributions_changed,
+                .clusters = done->clusters,
+                .batches = done->batches,
+                .dispatches = done->dispatches,
+                .receivers = done->receivers,
+                .bytes_read = done->bytes_read,
+                .bytes_written = done->bytes_written,
+                .host_us = done->host_us,
+                .gpu_us = done->gpu_us};
+    return DIMMER_OK;
+}
+
+namespace {
+
+// The runtime behind the lights, or null, and reported, where it is the other one.
+template <class Wanted, class Lights>
+auto* as(Lights* lights) {
+    auto* runtime = std::get_if<Wanted>(&lights->runtime);
+    if (!runtime)
+        report(ErrorCode::Unsupported, std::is_same_v<Wanted, CpuRuntime>
+                                           ? "these lights are blended by Vulkan, not on the CPU"
+                                           : "these lights are blended on the CPU, not by Vulkan");
+    return runtime;
+}
+
+dimmer_result copyPages(std::span<const uint32_t> irradiance, std::span<const uint32_t> direction,
+                        uint32_t* irradiance_out, uint32_t* direction_out, size_t room) {
+    if (room < irradiance.size())
+        return report({ErrorCode::InvalidArgument,
+                       fmt::format("the pages hold {} texels, there is room for {}", irradiance.size(), room)});
+    std::ranges::copy(irradiance, irradiance_out);
+    std::ranges::copy(direction, direction_out);
+    return DIMMER_OK;
+}
+
+}  // namespace
+}  // namespace dimmer::c
+
+using namespace dimmer;
+using namespace dimmer::c;
+
+dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, dimmer_lights** lights) {
+    if (!given(pack, lights)) return DIMMER_INVALID_ARGUMENT;
+    if (thread_count == 0) return report(ErrorCode::InvalidArgument, "lights on the CPU need one thread at least");
+    return guarded([&] {
+        *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count)};
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
+                                          dimmer_buffering buffering, dimmer_lights** lights) {
+    if (!given(pack, vulkan, lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const VulkanContext context{.instance = vulkan->instance,
+                                    .physical_device = vulkan->physical_device,
+                                    .device = vulkan->device,
+                                    .queue = vulkan->queue,
+                                    .queue_family = vulkan->queue_family,
+                                    .compute_queue = vulkan->compute_queue,
+                                    .compute_queue_family = vulkan->compute_queue_family};
+        RuntimeOptions options;
+        options.buffering = buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace;
+        auto created = Runtime::create(context, pack->pack, options);
+        if (!created) return report(created.error());
+        *lights = new dimmer_lights{std::move(*created)};
+        return DIMMER_OK;
+    });
+}
+
+void dimmer_lights_destroy(dimmer_lights* lights) {
+    delete lights;
+}
+
+dimmer_result dimmer_lights_set_weight(dimmer_lights* lights, uint32_t light_set, float weight) {
+    return dimmer_lights_set_weight_rgb(lights, light_set, weight, weight, weight);
+}
+
+dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light_set, float r, float g, float b) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] { return finish(lights->state().setWeight(LightSet{light_set}, {r, g, b})); });
+}
+
+dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] { return finish(lights->state().setDoor(Door{door}, open)); });
+}
+
+dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state) {
+    if (!given(lights, state)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] { return finish(lights->state().apply(state)); });
+}
+
+dimmer_result dimmer_lights_get_weight(const dimmer_lights* lights, uint32_t element, float rgb[3]) {
+    if (!given(lights, rgb)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const LightState& state = lights->state();
+        const auto elements = state.pack().elements();
+        if (element >= elements.size())
+            return report({ErrorCode::NotFound,
+                           fmt::format("there is no element {}; the pack has {}", element, elements.size())});
+        const Weight weight = elements[element].kind == ElementKind::Door ? Weight(state.open(Door{element}))
+                                                                          : state.weight(LightSet{element});
+        rgb[0] = weight.r;
+        rgb[1] = weight.g;
+        rgb[2] = weight.b;
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_update(dimmer_lights* lights, dimmer_update_stats* stats) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = as<CpuRuntime>(lights);
+        return runtime ? finish(runtime->update(), stats) : DIMMER_UNSUPPORTED;
+    });
+}
+
+dimmer_result dimmer_lights_read_pages(dimmer_lights* lights, uint32_t* irradiance, uint32_t* direction,
+                                       size_t texel_count) {
+    if (!given(lights, irradiance, direction)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        if (const auto* cpu = std::get_if<CpuRuntime>(&lights->runtime))
+            return copyPages(cpu->irradiancePages(), cpu->directionPages(), irradiance, direction, texel_count);
+        const auto pages = std::get<Runtime>(lights->runtime).readPages();
+        if (!pages) return report(pages.error());
+        return copyPages(pages->irradiance, pages->direction, irradiance, direction, texel_count);
+    });
+}
+
+dimmer_result dimmer_lights_get_pages(const dimmer_lights* lights, const uint32_t** irradiance,
+                                      const uint32_t** direction, size_t* texel_count) {
+    if (!given(lights, irradiance, direction, texel_count)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = as<CpuRuntime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        *irradiance = runtime->irradiancePages().data();
+        *direction = runtime->directionPages().data();
+        *texel_count = runtime->irradiancePages().size();
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats) {
+    if (!given(lights, commands)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = as<Runtime>(lights);
+        return runtime ? finish(runtime->record(commands), stats) : DIMMER_UNSUPPORTED;
+    });
+}
+
+dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = as<Runtime>(lights);
+        return runtime ? finish(runtime->submit(), stats) : DIMMER_UNSUPPORTED;
+    });
+}
+
+dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* stats) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = as<Runtime>(lights);
+        return runtime ? finish(runtime->wait(), stats) : DIMMER_UNSUPPORTED;
+    });
+}
+
+dimmer_result dimmer_lights_get_semaphore(const dimmer_lights* lights, VkSemaphore* semaphore, uint64_t* value) {
+    if (!given(lights, semaphore, value)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = as<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        *semaphore = runtime->semaphore();
+        *value = runtime->semaphoreValue();
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images) {
+    if (!given(lights, images)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = as<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        const LightmapImages from = runtime->images();
+        *images = {.irradiance = from.irradiance,
+                   .irradiance_view = from.irradiance_view,
+                   .direction = from.direction,
+                   .direction_view = from.direction_view,
+                   .sampler = from.sampler,
+                   .width = from.width,
+                   .height = from.height,
+                   .layers = from.layers};
+        return DIMMER_OK;
+    });
+}

@@ -1,0 +1,93 @@
+#include <gpu/probe_resampler.h>
+
+#include <fmt/format.h>
+#include <gpu/table_upload.h>
+#include <gpu/vk_result.h>
+#include <probes/grid_table.h>
+#include <spirv/resample_probes_comp.h>
+
+#include <cstring>
+
+namespace dimmer {
+namespace {
+
+struct DispatchConstants {
+    uint32_t item_count, first_moving;
+};
+
+}  // namespace
+
+Expected<GpuBuffer> uploadGridTable(const VulkanContext& vulkan, const GlobalGrid& grid, Transfer& transfer) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const uint64_t bytes = gridTableBytes(grid);
+    if (bytes > properties.limits.maxStorageBufferRange)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("The global light grid's {} tetrahedra take {} bytes, more than the {} that this Vulkan "
+                        "device reads as one buffer. Cook with a wider grid.",
+                        grid.tetrahedra.size(), bytes, properties.limits.maxStorageBufferRange));
+    auto buffer = createBuffer(vulkan, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                               MemoryUse::Device);
+    if (!buffer) return buffer;
+    const auto table = gridTable(grid);
+    const auto words = std::as_bytes(std::span(table));
+    DIMMER_TRY(transfer.upload(buffer->buffer.get(), bytes, [&](VkDeviceSize offset, std::span<std::byte> piece) {
+        std::ranges::copy(words.subspan(offset, piece.size()), piece.begin());
+    }));
+    return buffer;
+}
+
+Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, const PackData& data,
+                                                const ModelSlots& models, const ProbeAtlas& atlas, VkBuffer grid_table,
+                                                Transfer& transfer) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    ProbeResampler resampler;
+    resampler.first_moving_ = static_cast<uint32_t>(data.probes.base.size());
+    resampler.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    auto hints = createBuffer(vulkan, models.probesMax() * sizeof(uint32_t),
+                              VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Device);
+    if (!hints) return std::unexpected(std::move(hints.error()));
+    resampler.hints_ = std::move(*hints);
+    DIMMER_TRY(transfer.upload(resampler.hints_.buffer.get(), resampler.hints_.size_bytes,
+                               [](VkDeviceSize, std::span<std::byte> piece) {
+                                   std::ranges::fill(piece, std::byte{0xff});  // no_tetrahedron
+                               }));
+    std::vector<KernelBinding> bindings;
+    for (uint32_t set = 0; set < atlas.setCount(); ++set) {
+        auto items = createTexelBuffer(vulkan, models.itemsMax() * sizeof(ResampleItem), VK_FORMAT_R32G32B32A32_UINT,
+                                       MemoryUse::Upload);
+        if (!items) return std::unexpected(std::move(items.error()));
+        bindings.insert(
+            bindings.end(),
+            {KernelBinding::ofTexels(items->view.get()), KernelBinding::ofBuffer(grid_table),
+             KernelBinding::ofBuffer(atlas.buffer(set)), KernelBinding::ofBuffer(resampler.hints_.buffer.get())});
+        resampler.sets_.push_back({std::move(*items), 0});
+    }
+    const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
+    auto kernel = Kernel::create(vulkan.device, spirv::resample_probes_comp, bindings, sizeof(DispatchConstants),
+                                 pipelines, atlas.setCount());
+    if (!kernel) return std::unexpected(std::move(kernel.error()));
+    resampler.kernel_ = std::move(*kernel);
+    return resampler;
+}
+
+void ProbeResampler::write(std::span<const ResampleItem> items, uint32_t set) {
+    std::memcpy(sets_[set].items.buffer.mapped, items.data(), items.size_bytes());
+    sets_[set].item_count = static_cast<uint32_t>(items.size());
+}
+
+void ProbeResampler::dispatch(VkCommandBuffer commands, uint32_t set) const {
+    kernel_.bind(commands, 0, set);
+    kernel_.push(commands, DispatchConstants{sets_[set].item_count, first_moving_});
+    dispatchRows(commands, sets_[set].item_count, groups_x_max_);
+}
+
+uint64_t ProbeResampler::deviceBytes() const {
+    uint64_t bytes = hints_.size_bytes;
+    for (const Set& set : sets_) bytes += bytesOf({&set.items});
+    return bytes;
+}
+
+}  // namespace dimmer

@@ -1,0 +1,218 @@
+/* Dimmer for C: a pack, and its light blended on the CPU or by Vulkan compute. The same library, `dimmer_runtime`, as
+ * the C++ headers beside this one, which say more about cost and synchronisation; docs/integrate.md has an example.
+ *
+ * Every function that can fail returns a dimmer_result; on anything but DIMMER_OK nothing was changed, output arguments
+ * included, and dimmer_error_message() says in a sentence what is wrong and how to mend it. A null pointer where one is
+ * needed is DIMMER_INVALID_ARGUMENT. Texts are UTF-8 and end in 0. Units: metres, +Y up; lux; linear Rec.709 colour.
+ *
+ * Threads: a dimmer_pack may be used by any number of threads; a dimmer_lights by one at a time.
+ *
+ * Define DIMMER_NO_VULKAN before including it where there are no Vulkan headers. */
+#ifndef DIMMER_DIMMER_H
+#define DIMMER_DIMMER_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#ifndef DIMMER_NO_VULKAN
+#include <vulkan/vulkan.h>
+#endif
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum dimmer_result {
+    DIMMER_OK = 0,
+    DIMMER_INVALID_ARGUMENT = 1, /* the caller's value is out of its range */
+    DIMMER_NOT_FOUND = 2,        /* no light set, door or index of that name or number */
+    DIMMER_BAD_INPUT = 3,        /* a file's content cannot be used */
+    DIMMER_UNSUPPORTED = 4,      /* the device or this build lacks something that is needed */
+    DIMMER_OUT_OF_MEMORY = 5,    /* host or device memory */
+    DIMMER_DEVICE_LOST = 6,      /* destroy the lights and create them anew on a new device */
+    DIMMER_IO = 7,               /* a file could not be read */
+    DIMMER_INTERNAL = 8          /* a broken promise of ours; please report it */
+} dimmer_result;
+
+/* What the last call of this thread that failed had to say; empty before the first. Valid until this thread's next
+ * failing call. Never null. */
+const char* dimmer_error_message(void);
+
+/* No element: a mesh without a door, an emission without a light set. */
+#define DIMMER_NONE UINT32_MAX
+
+/* ---- Pack: a cooked level, read and validated. Never changes once it is open. ---- */
+
+typedef struct dimmer_pack dimmer_pack;
+
+/* Reads and validates a whole file. */
+dimmer_result dimmer_pack_open(const char* path, dimmer_pack** pack);
+/* The same from memory, which is not needed afterwards; `name` stands for the file in messages. */
+dimmer_result dimmer_pack_from_memory(const void* bytes, size_t byte_count, const char* name, dimmer_pack** pack);
+/* Null is allowed. Lights made from the pack stay usable; texts and arrays that the pack gave out do not. */
+void dimmer_pack_close(dimmer_pack* pack);
+
+typedef enum dimmer_color_format {
+    DIMMER_R11G11B10F = 0, /* VK_FORMAT_B10G11R11_UFLOAT_PACK32 */
+    DIMMER_E5B9G9R9 = 1    /* VK_FORMAT_E5B9G9R9_UFLOAT_PACK32 */
+} dimmer_color_format;
+
+typedef enum dimmer_direction_model { DIMMER_AHD = 0, DIMMER_LINEAR = 1 } dimmer_direction_model;
+
+typedef struct dimmer_pack_info {
+    uint32_t page_count, page_width, page_height; /* of the lightmap, in texels */
+    dimmer_color_format color_format;             /* of the irradiance pages; direction is A2B10G10R10_UNORM_PACK32 */
+    dimmer_direction_model direction_model;       /* as sample.glsl wants it */
+    float exposure;                               /* stored light = lux * exposure; a power of two */
+    uint32_t element_count, mesh_count, viewpoint_count;
+} dimmer_pack_info;
+
+dimmer_result dimmer_pack_get_info(const dimmer_pack* pack, dimmer_pack_info* info);
+
+typedef enum dimmer_element_kind { DIMMER_LIGHT_SET = 0, DIMMER_DOOR = 1 } dimmer_element_kind;
+
+/* A thing that the game controls. */
+typedef struct dimmer_element {
+    const char* name; /* unique among its kind; lives as long as the pack */
+    dimmer_element_kind kind;
+    float max_weight; /* the largest weight that a light set accepts; 1 for doors */
+} dimmer_element;
+
+/* `index`: 0 .. element_count - 1, light sets first. It is the handle that lights take. */
+dimmer_result dimmer_pack_get_element(const dimmer_pack* pack, uint32_t index, dimmer_element* element);
+/* Light sets and doors have separate names. The message of DIMMER_NOT_FOUND names the nearest. */
+dimmer_result dimmer_pack_find_light_set(const dimmer_pack* pack, const char* name, uint32_t* element);
+dimmer_result dimmer_pack_find_door(const dimmer_pack* pack, const char* name, uint32_t* element);
+
+typedef struct dimmer_vertex {
+    float position_m[3];  /* world space */
+    float normal[3];      /* unit, world space */
+    float lightmap_uv[2]; /* 0..1 over the page */
+} dimmer_vertex;
+
+/* A mesh of the level; single-sided triangles, counter-clockwise seen from their front. */
+typedef struct dimmer_mesh {
+    const char* node; /* the glTF node's name; pointers live as long as the pack */
+    const dimmer_vertex* vertices;
+    const uint32_t* indices; /* 3 per triangle */
+    uint32_t vertex_count, index_count;
+    uint32_t page;
+    uint32_t door;           /* the element whose leaf this is, or DIMMER_NONE */
+    float reflectance[3];    /* Lambert */
+    float emission_cd_m2[3]; /* radiance of an emissive material */
+    uint32_t emission_set;   /* the element that dims the emission, or DIMMER_NONE */
+} dimmer_mesh;
+
+dimmer_result dimmer_pack_get_mesh(const dimmer_pack* pack, uint32_t index, dimmer_mesh* mesh);
+
+/* A place to look from: a glTF camera, or the node "player_start". */
+typedef struct dimmer_viewpoint {
+    const char* name;
+    float position_m[3];
+    float forward[3]; /* unit */
+    float vertical_fov_rad;
+} dimmer_viewpoint;
+
+dimmer_result dimmer_pack_get_viewpoint(const dimmer_pack* pack, uint32_t index, dimmer_viewpoint* viewpoint);
+
+/* ---- Lights: the weights of a level's light sets and doors, and the pages blended from them. ---- */
+
+typedef struct dimmer_lights dimmer_lights;
+
+/* On the CPU, with `thread_count` threads (1 or more, the caller's included). Keeps what it needs of the pack alive. */
+dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, dimmer_lights** lights);
+/* Null is allowed. Waits for what dimmer_lights_submit() sent; what was recorded must have completed. */
+void dimmer_lights_destroy(dimmer_lights* lights);
+
+/* Changes cost nanoseconds and take effect with the next update. At the start every light set is at 1 (or its maximum,
+ * where that is smaller) and every door is closed. A weight is 0 .. max_weight, per channel where it has three;
+ * `open` is 0 (closed) .. 1 (open). */
+dimmer_result dimmer_lights_set_weight(dimmer_lights* lights, uint32_t light_set, float weight);
+dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light_set, float r, float g, float b);
+dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open);
+/* Many at once, as text: "all=0,hall=0.5,alarm=1/0.2/0.2,door:front=1". */
+dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state);
+/* As set last: of a door, `open` in all three. */
+dimmer_result dimmer_lights_get_weight(const dimmer_lights* lights, uint32_t element, float rgb[3]);
+
+/* What an update did. Any pointer to one below may be null. */
+typedef struct dimmer_update_stats {
+    uint32_t contributions_changed, clusters, batches, dispatches;
+    uint64_t receivers; /* texels and probes written */
+    uint64_t bytes_read, bytes_written;
+    double host_us;
+    double gpu_us; /* by timestamps, from dimmer_lights_wait(); else 0 */
+} dimmer_update_stats;
+
+/* Blends what changed, on the CPU and before it returns. DIMMER_UNSUPPORTED for lights on Vulkan. */
+dimmer_result dimmer_lights_update(dimmer_lights* lights, dimmer_update_stats* stats);
+
+/* The pages as they are, page after page, rows from the top, page_count * page_height * page_width texels each: copied,
+ * from a Vulkan device too (there it waits for the device: for tools). `texel_count`: the room in each array. */
+dimmer_result dimmer_lights_read_pages(dimmer_lights* lights, uint32_t* irradiance, uint32_t* direction,
+                                       size_t texel_count);
+/* Lights on the CPU alone: the pages themselves, for as long as the lights live; updates change them in place. */
+dimmer_result dimmer_lights_get_pages(const dimmer_lights* lights, const uint32_t** irradiance,
+                                      const uint32_t** direction, size_t* texel_count);
+
+/* Irradiance in lux, bilinear, of pages as above. `uv`: 0..1 over the page; `normal_tangent`: the unit normal in the
+ * texel's tangent frame, {0, 0, 1} for the surface's own. Any thread, while nothing writes these pages. */
+dimmer_result dimmer_sample_lightmap(const dimmer_pack* pack, const uint32_t* irradiance, const uint32_t* direction,
+                                     size_t texel_count, uint32_t page, const float uv[2],
+                                     const float normal_tangent[3], float lux[3]);
+
+#ifndef DIMMER_NO_VULKAN
+
+/* The caller's device: Vulkan 1.2 with timelineSemaphore, and a queue with compute. It must outlive the lights. */
+typedef struct dimmer_vulkan {
+    VkInstance instance;
+    VkPhysicalDevice physical_device;
+    VkDevice device;
+    VkQueue queue;
+    uint32_t queue_family;
+    VkQueue compute_queue; /* optional: where dimmer_lights_submit() runs; VK_NULL_HANDLE: on `queue` */
+    uint32_t compute_queue_family;
+} dimmer_vulkan;
+
+typedef enum dimmer_buffering {
+    DIMMER_IN_PLACE = 0,       /* updates write the pages that frames sample, between barriers of their own */
+    DIMMER_DOUBLE_BUFFERED = 1 /* two sets of pages that take turns; twice the memory for pages */
+} dimmer_buffering;
+
+dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
+                                          dimmer_buffering buffering, dimmer_lights** lights);
+
+/* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
+
+/* Records the update into the caller's command buffer, outside a render pass, with the barriers that let fragment and
+ * compute shaders sample afterwards. Nothing changed: nothing is recorded. The submission must have completed before
+ * the next recording. */
+dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
+
+/* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. */
+dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats);
+/* Blocks until what was submitted is done, and gives the last update's figures, its time on the GPU included. */
+dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* stats);
+/* A timeline semaphore, and the value that the last submission signals. */
+dimmer_result dimmer_lights_get_semaphore(const dimmer_lights* lights, VkSemaphore* semaphore, uint64_t* value);
+
+/* 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates. */
+typedef struct dimmer_images {
+    VkImage irradiance;
+    VkImageView irradiance_view;
+    VkImage direction;
+    VkImageView direction_view;
+    VkSampler sampler; /* bilinear, clamp to edge */
+    uint32_t width, height, layers;
+} dimmer_images;
+
+/* What to sample after the last update; with DIMMER_DOUBLE_BUFFERED, ask after each. */
+dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images);
+
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

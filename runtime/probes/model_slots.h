@@ -1,0 +1,78 @@
+// The probes of moving models: who has which, and which are to be taken from the global grid anew. No Vulkan in it.
+#pragma once
+
+#include <dimmer/error.h>
+#include <dimmer/models.h>
+#include <pack/pack_data.h>
+#include <update/record_pool.h>
+
+#include <dimmer/work_list.glsl>
+#include <span>
+#include <vector>
+
+namespace dimmer {
+
+struct Box {
+    std::array<float, 3> min_m, max_m;
+    bool meets(const Box& other) const {
+        for (size_t i = 0; i < 3; ++i)
+            if (!(min_m[i] <= other.max_m[i] && other.min_m[i] <= max_m[i])) return false;
+        return true;
+    }
+};
+
+// Per cluster of probes: the box of all tetrahedra that one of its probes is a corner of. A place outside is not lit by
+// them. Clusters without global probes have an empty box.
+std::vector<Box> boxesOfClusters(const PackData& data);
+
+class ModelSlots {
+   public:
+    // Numbers of moving probes begin behind the pack's own. Reserves for the worst case.
+    ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_sets);
+
+    Expected<Model> add(const ModelGrid& grid, const Transform& transform);
+    Expected<void> move(Model model, const Transform& transform);
+    Expected<void> remove(Model model);
+    Expected<ModelSlot> slot(Model model) const;
+    uint32_t modelCount() const { return model_count_; }
+    uint32_t probesMax() const { return probes_max_; }
+    uint32_t itemsMax() const { return probes_max_ / probes_granule; }
+
+    // The light of these batches of probes has changed. Cost: their clusters times the models, within limits.
+    void touch(uint32_t page_set, std::span<const WorkItem> items);
+    bool dirty(uint32_t page_set) const { return dirty_counts_[page_set] > 0; }
+    // Lists the probes to be taken anew and counts them as done. Valid until the next call.
+    std::span<const ResampleItem> take(uint32_t page_set);
+    // What take() listed was not carried out.
+    void rollback(uint32_t page_set);
+
+   private:
+    // Models take whole granules, so that work lists have a size that fits all.
+    static constexpr uint32_t probes_granule = 8;
+
+    struct Slot {
+        ModelGrid grid;
+        Transform transform;
+        Box box;
+        uint32_t first_probe = 0, generation = 0;
+        uint32_t dirty = 0;  // a bit per set of pages
+        uint32_t taken = 0;  // likewise, by the last take()
+        bool used = false;
+    };
+    Expected<uint32_t> find(Model model) const;
+    void place(Slot& slot, const Transform& transform);
+    void mark(Slot& slot, uint32_t sets);
+    uint32_t granules(const ModelGrid& grid) const { return (grid.probeCount() + probes_granule - 1) / probes_granule; }
+
+    uint32_t first_probe_ = 0, probes_max_ = 0, page_sets_ = 1, model_count_ = 0;
+    bool has_grid_ = false;
+    Box grid_box_;     // places outside have the light of its nearest point
+    RecordPool pool_;  // of granules
+    std::vector<Slot> slots_;
+    std::vector<uint32_t> free_slots_;
+    std::vector<uint32_t> dirty_counts_;  // per set of pages
+    std::vector<Box> cluster_boxes_, changed_;
+    std::vector<ResampleItem> items_;
+};
+
+}  // namespace dimmer

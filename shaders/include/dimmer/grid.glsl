@@ -1,0 +1,233 @@
+// Light from probes in a shader: of a moving or static model's own grid, and straight from the level's global grid for
+// fog, particles and volumes. The CPU twins: runtime/probes/tetrahedron_walk.cpp, <dimmer/probe_grid.h>.
+//
+// Before it is included, two macros must say how to read the runtime's buffers:
+//
+//     layout(set = 0, binding = 2, std430) readonly buffer Probes { uint probes[]; };     // Runtime::probes
+//     layout(set = 0, binding = 3, std430) readonly buffer Grid { uvec4 grid_table[]; };  // Runtime::gridTable
+//     #define DIMMER_PROBE_WORD(i) probes[i]
+//     #define DIMMER_GRID_WORDS(i) grid_table[i]   // for the functions that take a place in the world alone
+//     #include <dimmer/grid.glsl>
+//     ...
+//     vec3 e_lux = dimmer_model_irradiance(slot, position, normal, exposure, format);
+#ifndef DIMMER_GRID_GLSL
+#define DIMMER_GRID_GLSL
+
+#include "dimmer/probe.glsl"
+
+DimmerProbe dimmer_probe_load(uint number) {
+    uint w = number * 7u;
+    return DimmerProbe(DIMMER_PROBE_WORD(w),
+                       uint[6](DIMMER_PROBE_WORD(w + 1u), DIMMER_PROBE_WORD(w + 2u), DIMMER_PROBE_WORD(w + 3u),
+                               DIMMER_PROBE_WORD(w + 4u), DIMMER_PROBE_WORD(w + 5u), DIMMER_PROBE_WORD(w + 6u)));
+}
+
+#ifdef DIMMER_GRID_WORDS
+
+const uint dimmer_no_tetrahedron = 0xffffffffu;
+const uint dimmer_hinted_steps_max = 32u;  // these as in tetrahedron_walk.h
+const uint dimmer_walk_steps_max = 1024u;
+const float dimmer_inside_tolerance = 1e-4;
+const float dimmer_visibility_slope = 8.0;
+const float dimmer_visible_weight_min = 1e-5;
+
+struct DimmerGridPlace {
+    uint tetrahedron;
+    vec4 barycentric;
+};
+
+// The table: min.xyz and where positions begin; max.xyz and where tetrahedra do; counts.xyz of the start grid and where
+// the starts do; whether there is visibility, and how many tetrahedra. A position is one element, a tetrahedron three:
+// probes, neighbours, visibility; four starts share one. See gridTable in runtime/gpu/probe_resampler.cpp.
+uvec4 dimmer_tetrahedron_part(uint tetrahedron, uint part) {
+    return DIMMER_GRID_WORDS(DIMMER_GRID_WORDS(1).w + 3u * tetrahedron + part);
+}
+
+vec3 dimmer_probe_position(uint number) {
+    return uintBitsToFloat(DIMMER_GRID_WORDS(DIMMER_GRID_WORDS(0).w + number).xyz);
+}
+
+float dimmer_determinant(vec3 a, vec3 b, vec3 c) {
+    precise float x = b.y * c.z - b.z * c.y;
+    precise float y = b.z * c.x - b.x * c.z;
+    precise float z = b.x * c.y - b.y * c.x;
+    precise float sum = a.x * x + a.y * y + a.z * z;
+    return sum;
+}
+
+vec4 dimmer_barycentric(uint tetrahedron, vec3 point) {
+    uvec4 probes_of = dimmer_tetrahedron_part(tetrahedron, 0u);
+    vec3 a = dimmer_probe_position(probes_of.x) - point, b = dimmer_probe_position(probes_of.y) - point;
+    vec3 c = dimmer_probe_position(probes_of.z) - point, d = dimmer_probe_position(probes_of.w) - point;
+    vec4 volumes = vec4(dimmer_determinant(b, c, d), dimmer_determinant(a, d, c), dimmer_determinant(a, b, d),
+                        dimmer_determinant(a, c, b));
+    precise float sum = volumes.x + volumes.y + volumes.z + volumes.w;
+    precise float inverse = 1.0 / sum;
+    precise vec4 shares = volumes * inverse;
+    return shares;
+}
+
+bool dimmer_walk(vec3 point, uint steps_max, inout DimmerGridPlace place) {
+    for (uint step = 0u;; ++step) {
+        place.barycentric = dimmer_barycentric(place.tetrahedron, point);
+        uint face = 0u;
+        float least = place.barycentric.x;
+        for (uint i = 1u; i < 4u; ++i)
+            if (place.barycentric[i] < least) {
+                face = i;
+                least = place.barycentric[i];
+            }
+        if (!(least < -dimmer_inside_tolerance)) return true;
+        uint next = dimmer_tetrahedron_part(place.tetrahedron, 1u)[face];
+        if (next == dimmer_no_tetrahedron) return true;
+        if (step == steps_max) return false;
+        place.tetrahedron = next;
+    }
+}
+
+uint dimmer_start(vec3 point, vec3 low, vec3 high) {
+    uvec4 counts = DIMMER_GRID_WORDS(2);
+    precise vec3 extent = high - low;
+    precise vec3 from_low = point - low;
+    precise vec3 share = from_low / extent;
+    precise vec3 cells = share * vec3(counts.xyz);
+    uvec3 cell = min(uvec3(cells), counts.xyz - 1u);
+    uint number = cell.x + counts.x * (cell.y + counts.y * cell.z);
+    return DIMMER_GRID_WORDS(counts.w + (number >> 2))[number & 3u];
+}
+
+// `hint`: a tetrahedron that is likely near, or dimmer_no_tetrahedron.
+DimmerGridPlace dimmer_locate(vec3 point, uint hint) {
+    vec3 low = uintBitsToFloat(DIMMER_GRID_WORDS(0).xyz), high = uintBitsToFloat(DIMMER_GRID_WORDS(1).xyz);
+    for (int i = 0; i < 3; ++i) point[i] = point[i] > low[i] ? (point[i] < high[i] ? point[i] : high[i]) : low[i];
+    DimmerGridPlace place = DimmerGridPlace(hint, vec4(0));
+    bool hinted = hint < DIMMER_GRID_WORDS(3).y;
+    if (!hinted || !dimmer_walk(point, dimmer_hinted_steps_max, place)) {
+        place.tetrahedron = dimmer_start(point, low, high);
+        dimmer_walk(point, dimmer_walk_steps_max, place);
+    }
+    precise vec4 weights;
+    for (int i = 0; i < 4; ++i) {
+        float w = place.barycentric[i];
+        weights[i] = w > 0.0 ? (w < 1.0 ? w : 1.0) : 0.0;
+    }
+    precise float sum = weights.x + weights.y + weights.z + weights.w;
+    precise vec4 shares = weights / sum;
+    place.barycentric = sum > 0.0 ? shares : vec4(0.25);
+    return place;
+}
+
+// The shares of the tetrahedron's four probes.
+vec4 dimmer_probe_weights(DimmerGridPlace place) {
+    vec4 b = place.barycentric;
+    if (DIMMER_GRID_WORDS(3).x == 0u) return b;
+    uvec4 seen = dimmer_tetrahedron_part(place.tetrahedron, 2u);
+    precise vec4 weights;
+    for (int v = 0; v < 4; ++v) {
+        precise float field = b.x * float(bitfieldExtract(int(seen[v]), 0, 8)) +
+                              b.y * float(bitfieldExtract(int(seen[v]), 8, 8)) +
+                              b.z * float(bitfieldExtract(int(seen[v]), 16, 8)) +
+                              b.w * float(bitfieldExtract(int(seen[v]), 24, 8));
+        precise float visible = field * (dimmer_visibility_slope / 127.0);
+        float clamped = visible > 0.0 ? (visible < 1.0 ? visible : 1.0) : 0.0;
+        weights[v] = b[v] * clamped;
+    }
+    precise float sum = weights.x + weights.y + weights.z + weights.w;
+    precise vec4 shares = weights / sum;
+    return sum > dimmer_visible_weight_min ? shares : b;
+}
+
+#endif
+
+// Radiance over all directions, spherical harmonics of bands 0..2 in the order of a probe's bytes.
+struct DimmerRadiance {
+    vec3 coefficients[9];
+};
+
+void dimmer_radiance_add(inout DimmerRadiance sum, DimmerProbe probe, float weight, uint format) {
+    // What is lifted and scaled is 2^-12 of the light; see weightScale in runtime/format/texel.h.
+    vec3 light = 4096.0 * weight * (dimmer_lift(probe.light, format) * dimmer_weight_scale(format));
+    sum.coefficients[0] += light;
+    for (int i = 0; i < dimmer_probe_triples; ++i) {
+        // Codes carry 128; a coefficient is light * sqrt(2l + 1) * code / 127.
+        vec3 codes = vec3(dimmer_probe_code(probe, 3 * i), dimmer_probe_code(probe, 3 * i + 1),
+                          dimmer_probe_code(probe, 3 * i + 2)) - 128.0;
+        sum.coefficients[1 + i] += light * codes * ((i < 3 ? 1.73205081 : 2.23606798) / 127.0);
+    }
+}
+
+// Sum of Y_lm(direction) * band[l] * L_lm; direction of length 1.
+vec3 dimmer_radiance_sum(DimmerRadiance radiance, vec3 d, vec3 band) {
+    vec3 sum = band.x * 0.282094792 * radiance.coefficients[0];
+    sum += band.y * 0.488602512 *
+           (d.y * radiance.coefficients[1] + d.z * radiance.coefficients[2] + d.x * radiance.coefficients[3]);
+    sum += band.z * (1.092548431 * (d.x * d.y * radiance.coefficients[4] + d.y * d.z * radiance.coefficients[5] +
+                                    d.x * d.z * radiance.coefficients[7]) +
+                     0.315391565 * (3.0 * d.z * d.z - 1.0) * radiance.coefficients[6] +
+                     0.546274215 * (d.x * d.x - d.y * d.y) * radiance.coefficients[8]);
+    return sum;
+}
+
+// Irradiance in lux on a surface with this unit normal: the cosine's bands are pi, 2 pi / 3, pi / 4 (Ramamoorthi and
+// Hanrahan 2001).
+vec3 dimmer_radiance_irradiance(DimmerRadiance radiance, vec3 normal) {
+    return max(dimmer_radiance_sum(radiance, normal, vec3(3.14159265, 2.09439510, 0.785398163)), vec3(0));
+}
+
+// ModelSlot of <dimmer/models.h>, as std140 and std430 lay it out alike.
+struct DimmerModelSlot {
+    uvec4 first_probe_counts;  // first_probe, counts.xyz
+    vec4 grid_from_world[3];   // rows
+};
+
+// What arrives at a place of a model, cd/m2: linear between its probes.
+DimmerRadiance dimmer_model_radiance(DimmerModelSlot slot, vec3 position, float exposure, uint format) {
+    uvec3 counts = slot.first_probe_counts.yzw;
+    vec3 at = vec3(dot(slot.grid_from_world[0], vec4(position, 1)), dot(slot.grid_from_world[1], vec4(position, 1)),
+                   dot(slot.grid_from_world[2], vec4(position, 1)));
+    at = clamp(at, vec3(0), vec3(counts - 1u));
+    uvec3 low = min(uvec3(at), max(counts, uvec3(2)) - 2u);
+    vec3 share = at - vec3(low);
+    DimmerRadiance sum;
+    for (int i = 0; i < 9; ++i) sum.coefficients[i] = vec3(0);
+    for (uint corner = 0u; corner < 8u; ++corner) {
+        uvec3 step = uvec3(corner & 1u, corner >> 1 & 1u, corner >> 2);
+        vec3 shares = mix(1.0 - share, share, vec3(step));
+        float weight = shares.x * shares.y * shares.z;
+        if (weight <= 0.0) continue;
+        uvec3 cell = low + step;
+        uint number = slot.first_probe_counts.x + cell.x + counts.x * (cell.y + counts.y * cell.z);
+        dimmer_radiance_add(sum, dimmer_probe_load(number), weight / exposure, format);
+    }
+    return sum;
+}
+
+// Irradiance in lux on a model's surface.
+//   position, normal   world space; the normal of length 1
+//   exposure, format   Pack::exposure(), Pack::colorFormat(): best a constant or a specialisation constant
+vec3 dimmer_model_irradiance(DimmerModelSlot slot, vec3 position, vec3 normal, float exposure, uint format) {
+    return dimmer_radiance_irradiance(dimmer_model_radiance(slot, position, exposure, format), normal);
+}
+
+#ifdef DIMMER_GRID_WORDS
+
+// What arrives at a place in the open air, straight from the global grid. Costs a walk through some tetrahedra.
+DimmerRadiance dimmer_volume_radiance(vec3 position, float exposure, uint format) {
+    DimmerGridPlace place = dimmer_locate(position, dimmer_no_tetrahedron);
+    vec4 weights = dimmer_probe_weights(place);
+    uvec4 numbers = dimmer_tetrahedron_part(place.tetrahedron, 0u);
+    DimmerRadiance sum;
+    for (int i = 0; i < 9; ++i) sum.coefficients[i] = vec3(0);
+    for (int i = 0; i < 4; ++i)
+        dimmer_radiance_add(sum, dimmer_probe_load(numbers[i]), weights[i] / exposure, format);
+    return sum;
+}
+
+// Irradiance in lux on a surface there.
+vec3 dimmer_grid_irradiance(vec3 position, vec3 normal, float exposure, uint format) {
+    return dimmer_radiance_irradiance(dimmer_volume_radiance(position, exposure, format), normal);
+}
+
+#endif
+
+#endif

@@ -1,0 +1,30 @@
+/* What the C part of the tests of dimmer.h does for the C++ part. */
+#ifndef DIMMER_TESTS_C_API_H
+#define DIMMER_TESTS_C_API_H
+
+#include <dimmer/dimmer.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Each returns 0, or the line on which an expectation failed, with a message in `problem`. */
+extern char problem[512];
+
+/* Everything that the pack holds. `pack`: tests/pack/sample_pack.h, in a file. */
+int look_into_pack(const char* path);
+/* Whatever is wrong with the arguments. */
+int misuse(const char* path);
+/* set0 at 0.5, set1 at 2/0.25/0, door0 half open, on the CPU; the pages into arrays of `texel_count`. */
+int blend_on_cpu(const char* path, uint32_t* irradiance, uint32_t* direction, size_t texel_count);
+/* The same state on a Vulkan device, first by submit, then, with all sets off between, by record. */
+int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irradiance, uint32_t* direction,
+                    size_t texel_count);
+/* The example of docs/integrate.md. */
+int shade_player(const char* path, float lux[3]);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,88 @@
+// The C interface: C code (c_api.c, compiled as C11) drives it, and what it blends is compared with the C++ runtime.
+#include <c/c_api.h>
+#include <dimmer/cpu_runtime.h>
+#include <gmock/gmock.h>
+#include <pack/sample_pack.h>
+#include <runtime/gpu_fixture.h>
+#include <scene/level_file.h>
+#include <write/pack_writer.h>
+
+namespace dimmer::test {
+namespace {
+
+// The sample pack as a file, its first set renamed where a test wants that.
+struct PackOnDisk {
+    explicit PackOnDisk(const std::string& first_set = "set0") {
+        PackData data = samplePack();
+        data.elements[0].name = first_set;
+        path = (folder.path / "level.dimmer").string();
+        EXPECT_TRUE(cook::writeFileAtomically(path, cook::packBytes(data)));
+    }
+    cook::test::TemporaryFolder folder;
+    std::string path;
+};
+
+struct BlendedPages {
+    std::vector<uint32_t> irradiance = std::vector<uint32_t>(2048), direction = irradiance;
+};
+
+// The same state by the C++ interface.
+BlendedPages expectedPages() {
+    CpuRuntime runtime(*Pack::fromData(samplePack()));
+    EXPECT_TRUE(runtime.apply("set0=0.5,set1=2/0.25/0,door:door0=0.5"));
+    runtime.update();
+    return {{runtime.irradiancePages().begin(), runtime.irradiancePages().end()},
+            {runtime.directionPages().begin(), runtime.directionPages().end()}};
+}
+
+TEST(CInterface, LooksIntoAPack) {
+    EXPECT_EQ(look_into_pack(PackOnDisk().path.c_str()), 0) << problem;
+}
+
+TEST(CInterface, MisuseIsRefusedWithAMessage) {
+    EXPECT_EQ(misuse(PackOnDisk().path.c_str()), 0) << problem;
+}
+
+TEST(CInterface, BlendsOnTheCpu) {
+    BlendedPages pages;
+    ASSERT_EQ(blend_on_cpu(PackOnDisk().path.c_str(), pages.irradiance.data(), pages.direction.data(), 2048), 0)
+        << problem;
+    const BlendedPages expected = expectedPages();
+    EXPECT_EQ(pages.irradiance, expected.irradiance);
+    EXPECT_EQ(pages.direction, expected.direction);
+}
+
+TEST(CInterface, TheExampleOfTheDocumentation) {
+    const PackOnDisk file("hall");
+    std::array<float, 3> lux{};
+    ASSERT_EQ(shade_player(file.path.c_str(), lux.data()), 0);
+    const auto pack = Pack::open(file.path);
+    CpuRuntime runtime(*pack);
+    ASSERT_TRUE(runtime.apply("hall=1/0.2/0.2"));
+    runtime.update();
+    EXPECT_EQ(lux,
+              sampleLightmap(*pack, runtime.irradiancePages(), runtime.directionPages(), 0, {0.25f, 0.5f}, {0, 0, 1}));
+}
+
+using CInterfaceGpu = GpuTest;
+
+TEST_F(CInterfaceGpu, BlendsByVulkan) {
+    const VulkanContext context = device().context();
+    const dimmer_vulkan vulkan{.instance = context.instance,
+                               .physical_device = context.physical_device,
+                               .device = context.device,
+                               .queue = context.queue,
+                               .queue_family = context.queue_family,
+                               .compute_queue = VK_NULL_HANDLE,
+                               .compute_queue_family = 0};
+    BlendedPages pages;
+    ASSERT_EQ(
+        blend_on_vulkan(PackOnDisk().path.c_str(), &vulkan, pages.irradiance.data(), pages.direction.data(), 2048), 0)
+        << problem;
+    const BlendedPages expected = expectedPages();
+    EXPECT_EQ(pages.irradiance, expected.irradiance);
+    EXPECT_EQ(pages.direction, expected.direction);
+}
+
+}  // namespace
+}  // namespace dimmer::test

@@ -1,0 +1,56 @@
+// Packs written by the builds of every format version so far (tests/golden/pack_v*.dimmer, the same small content in
+// each): read, or refused by version. A new version adds a file, written by the build that introduced it.
+#include <dimmer/cpu_runtime.h>
+#include <format/layout.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+namespace dimmer {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+Expected<Pack> openGolden(uint32_t version) {
+    return Pack::open(fmt::format("{}/tests/golden/pack_v{}.dimmer", DIMMER_SOURCE_DIR, version));
+}
+
+void expectContent(const Pack& pack) {
+    EXPECT_EQ(pack.exposure(), 0.5f);
+    ASSERT_EQ(pack.elements().size(), 2u);
+    EXPECT_EQ(pack.elements()[0].name, "hall");
+    EXPECT_EQ(pack.elements()[1].name, "front");
+    ASSERT_EQ(pack.contributions().size(), 2u);
+    EXPECT_EQ(pack.contributions()[0].receivers, 2u);
+    EXPECT_EQ(pack.contributions()[1].doors_open, std::vector{1u});
+    ASSERT_EQ(pack.meshes().size(), 1u);
+    EXPECT_EQ(pack.meshes()[0].node, "floor");
+    EXPECT_EQ(pack.viewpoints()[0].position_m, (std::array<float, 3>{1, 2, 3}));
+    CpuRuntime runtime(pack);
+    ASSERT_TRUE(runtime.apply("hall=0.5,door:front=1"));
+    EXPECT_EQ(runtime.update().receivers, 2u);
+}
+
+TEST(PackGolden, EveryVersionIsReadOrRefusedByName) {
+    ASSERT_GE(format::version, 3u);
+    for (uint32_t version = 1; version <= 3; ++version) {
+        SCOPED_TRACE(version);
+        const auto pack = openGolden(version);
+        if (pack) {
+            expectContent(*pack);
+            continue;
+        }
+        EXPECT_NE(version, format::version) << pack.error().message;
+        EXPECT_EQ(pack.error().code, ErrorCode::BadInput);
+        EXPECT_THAT(
+            pack.error().message,
+            AllOf(HasSubstr(fmt::format("pack_v{}.dimmer", version)),
+                  HasSubstr(fmt::format("of format version {}, this build reads version {}", version, format::version)),
+                  HasSubstr("cook the level again with this build")));
+    }
+}
+
+}  // namespace
+}  // namespace dimmer

@@ -1,0 +1,118 @@
+// grid.glsl on the device, held against its CPU twin.
+#include <dimmer/cpu_runtime.h>
+#include <dimmer/probe_grid.h>
+#include <dimmer/runtime.h>
+#include <gpu/kernel.h>
+#include <gpu/transfer.h>
+#include <gpu/vk_struct.h>
+#include <spirv/sample_grid_comp.h>
+
+#include "gpu_fixture.h"
+#include "model_pack.h"
+#include "pages.h"
+
+#include <cstring>
+
+namespace dimmer {
+namespace {
+
+using Vec4 = std::array<float, 4>;
+
+struct Query {
+    Vec4 position;  // w: exposure
+    Vec4 normal;    // w: colour format
+};
+struct Result {
+    Vec4 model_lux, grid_lux;
+};
+
+template <class T>
+T valueOf(Expected<T> expected) {
+    if (!expected) throw std::runtime_error(expected.error().message);
+    return std::move(*expected);
+}
+
+std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime, const ModelSlot& slot,
+                             const std::vector<Query>& queries) {
+    const auto filled = [&](const void* data, size_t bytes) {
+        GpuBuffer buffer = valueOf(createBuffer(vulkan, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Upload));
+        std::memcpy(buffer.mapped, data, bytes);
+        return buffer;
+    };
+    static_assert(sizeof(ModelSlot) == 64);  // DimmerModelSlot
+    const GpuBuffer model = filled(&slot, sizeof(slot)), input = filled(queries.data(), queries.size() * sizeof(Query));
+    std::vector<Result> results(queries.size());
+    const GpuBuffer output = valueOf(
+        createBuffer(vulkan, results.size() * sizeof(Result), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Readback));
+    const KernelBinding bindings[] = {
+        KernelBinding::ofBuffer(runtime.probes(0)), KernelBinding::ofBuffer(runtime.gridTable()),
+        KernelBinding::ofBuffer(model.buffer.get()), KernelBinding::ofBuffer(input.buffer.get()),
+        KernelBinding::ofBuffer(output.buffer.get())};
+    const Specialisation no_constants[] = {{}};
+    const Kernel kernel = valueOf(Kernel::create(vulkan.device, spirv::sample_grid_comp, bindings, 4, no_constants));
+    auto transfer = valueOf(Transfer::create(vulkan, MemoryUse::Readback));
+    const auto done = transfer.run([&](VkCommandBuffer commands) {
+        kernel.bind(commands, 0);
+        vkCmdDispatch(commands, static_cast<uint32_t>((queries.size() + 63) / 64), 1, 1);
+        auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+        barrier.srcAccessMask = VK_ACCESS_SHADER_WRITE_BIT;
+        barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
+        vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier,
+                             0, nullptr, 0, nullptr);
+    });
+    if (!done) throw std::runtime_error(done.error().message);
+    std::memcpy(results.data(), output.mapped, output.size_bytes);
+    return results;
+}
+
+class GridGlslTest : public test::GpuTest {};
+
+TEST_F(GridGlslTest, AgreesWithTheCpu) {
+    for (const auto format : {ColorFormat::E5B9G9R9, ColorFormat::R11G11B10F}) {
+        test::Random random(21);
+        PackData data = test::modelPack(2, 500, [](glm::vec3) { return glm::vec3(1); });
+        data.color_format = format;
+        for (auto* records : {&data.base_pages, &data.payload})
+            for (TexelRecord& record : *records) record = test::randomRecord(random, data.exposure, format);
+        for (ProbeRecord& probe : data.probes.base) probe = test::randomProbe(random, format);
+        data.probes.global.visibility.resize(data.probes.global.tetrahedra.size());
+        for (TetrahedronVisibility& v : data.probes.global.visibility)
+            for (auto& probe : v.seen)
+                for (int8_t& value : probe) value = static_cast<int8_t>(test::pick(random, 0, 255));
+        const Pack pack = test::packOf(std::move(data));
+        Runtime gpu = valueOf(Runtime::create(device().context(), pack, {.moving_probes_max = 64}));
+        CpuRuntime cpu(pack, 1, 64);
+        const ModelGrid grid{{-1, -0.5f, -2}, {1, 0.5f, 2}, {4, 1, 5}};
+        const Transform place = {{{{0.6f, 0, 0.8f, 5}, {0, 1, 0, 2}, {-0.8f, 0, 0.6f, 6}}}};
+        const ModelSlot slot = *gpu.modelSlot(*gpu.addModel(grid, place));
+        ASSERT_TRUE(cpu.addModel(grid, place) && gpu.submit() && gpu.wait());
+        cpu.update();
+
+        std::vector<Query> queries(2000);
+        for (Query& q : queries) {
+            const float z = test::uniform(random, -1, 1), angle = test::uniform(random, 0, 6.2831853f);
+            const float r = std::sqrt(1 - z * z);
+            q = {{test::uniform(random, 2, 8), test::uniform(random, -1, 4), test::uniform(random, 3, 9),
+                  pack.exposure()},
+                 {r * std::cos(angle), r * std::sin(angle), z, static_cast<float>(format)}};
+        }
+        const auto results = onDevice(device().context(), gpu, slot, queries);
+        const GridSampler sampler(pack, cpu.probes());
+        for (size_t i = 0; i < queries.size(); ++i) {
+            const std::array<float, 3> p = {queries[i].position[0], queries[i].position[1], queries[i].position[2]};
+            const std::array<float, 3> n = {queries[i].normal[0], queries[i].normal[1], queries[i].normal[2]};
+            const auto model_lux = sampler.sample(slot, p, n), grid_lux = sampler.sample(p, n);
+            const auto model_light = sampler.radiance(slot, p), grid_light = sampler.radiance(p);
+            for (size_t c = 0; c < 3; ++c) {
+                // Nine terms as large as L_00 times sqrt 5 each, rounded at 6e-8 some twenty times.
+                const float model_tolerance = 1e-4f * model_light.coefficients[0][c] + 1e-12f;
+                const float grid_tolerance = 1e-4f * grid_light.coefficients[0][c] + 1e-12f;
+                ASSERT_NEAR(results[i].model_lux[c], model_lux[c], model_tolerance) << i;
+                ASSERT_NEAR(results[i].grid_lux[c], grid_lux[c], grid_tolerance) << i;
+            }
+        }
+    }
+}
+
+}  // namespace
+}  // namespace dimmer
