@@ -116,7 +116,7 @@ void finalGather(benchmark::State& state) {
         .rays_max = rays_per_texel, .emitter_samples = 0, .noise_max = 0, .seed = 1, .floor_lux = floors};
     for (auto _ : state)
         forEachBlock(l.texels.size(), [&](size_t begin, size_t end) {
-            FinalGather gather(gatherer);
+            FinalGather<Gathered> gather(gatherer);
             std::vector<ReceiverLight> row;
             for (size_t i = begin; i < end; ++i) {
                 row.clear();

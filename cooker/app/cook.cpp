@@ -163,6 +163,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         "print the pairs of doors that lose light which needs both (each a warning, too) for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
+    c->add_option("--grid-baseline", a->options.grid_baseline,
+                  "the global grid as a baseline to measure it against: a uniform lattice of as many probes, probes "
+                  "unfitted, or without tables of what they see (unseen)")
+        ->check(CLI::IsMember({"uniform", "unfitted", "unseen"}));
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");

@@ -6,7 +6,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <filesystem>
+#include <glm/glm.hpp>
 #include <memory>
 
 namespace dimmer::cook {
@@ -53,18 +56,94 @@ nlohmann::ordered_json budgetsJson(const Profile& p) {
             {"per_element", p.budget_per_element}};
 }
 
+// Light, places and tables of what a game samples.
+uint64_t globalGridBytes(const PackData& d) {
+    const GlobalGrid& g = d.probes.global;
+    return g.positions.size() * (sizeof(ProbeRecord) + sizeof(ProbePosition)) +
+           g.tetrahedra.size() * sizeof(Tetrahedron) + g.visibility.size() * sizeof(TetrahedronVisibility) +
+           g.starts.size() * sizeof(uint32_t);
+}
+uint64_t localGridBytes(const PackData& d) {
+    return (d.probes.base.size() - d.probes.global.positions.size()) * sizeof(ProbeRecord);
+}
+
+// Per level of refinement.
+std::vector<size_t> probesByLevel(const GlobalGrid& grid) {
+    std::vector<size_t> counts;
+    for (const uint8_t level : grid.levels) {
+        if (level >= counts.size()) counts.resize(level + size_t{1});
+        ++counts[level];
+    }
+    return counts;
+}
+
+struct Flatness {
+    uint32_t tetrahedron;
+    double height_share;  // least height over longest edge; 0.82 when regular
+};
+
+double flatness(const GlobalGrid& grid, const Tetrahedron& t) {
+    std::array<glm::dvec3, 4> p;
+    for (size_t i = 0; i < 4; ++i) {
+        const ProbePosition& q = grid.positions[t.probes[i]];
+        p[i] = {q.x_m, q.y_m, q.z_m};
+    }
+    double longest = 0, area = 0;
+    for (size_t i = 0; i < 4; ++i) {
+        const glm::dvec3 a = p[(i + 1) % 4], b = p[(i + 2) % 4], c = p[(i + 3) % 4];
+        longest = std::max({longest, glm::distance(a, b), glm::distance(b, c), glm::distance(c, a)});
+        area = std::max(area, glm::length(glm::cross(b - a, c - a)));
+    }
+    const double volume = std::abs(glm::dot(p[1] - p[0], glm::cross(p[2] - p[0], p[3] - p[0])));
+    return area > 0 ? volume / area / longest : 0;
+}
+
+// The flattest first: where floats have least to hold on to.
+std::vector<Flatness> worstTetrahedra(const GlobalGrid& grid, size_t count) {
+    std::vector<Flatness> all;
+    for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) all.push_back({t, flatness(grid, grid.tetrahedra[t])});
+    count = std::min(count, all.size());
+    std::ranges::partial_sort(all, all.begin() + static_cast<std::ptrdiff_t>(count), {}, &Flatness::height_share);
+    all.resize(count);
+    return all;
+}
+
+void printGrid(const PackData& d) {
+    const GlobalGrid& grid = d.probes.global;
+    if (grid.empty()) return;
+    fmt::print("\nglobal grid: {} probes, {} tetrahedra, {}; {} local grids, {} probes, {}\n", grid.positions.size(),
+               grid.tetrahedra.size(), humanBytes(globalGridBytes(d)), d.probes.local.size(),
+               d.probes.base.size() - grid.positions.size(), humanBytes(localGridBytes(d)));
+    fmt::print("{:<26} {:>12}\n", "level of refinement", "probes");
+    const auto levels = probesByLevel(grid);
+    for (size_t n = 0; n < levels.size(); ++n) fmt::print("{:<26} {:>12}\n", n, levels[n]);
+    fmt::print("{:<26} {:>12}   at, m\n", "flattest tetrahedra", "height");
+    for (const Flatness& f : worstTetrahedra(grid, 3)) {
+        const ProbePosition& p = grid.positions[grid.tetrahedra[f.tetrahedron].probes[0]];
+        fmt::print("{:<26} {:>10.3f} %   {:.2f}, {:.2f}, {:.2f}\n", f.tetrahedron, 100 * f.height_share, p.x_m, p.y_m,
+                   p.z_m);
+    }
+}
+
 nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
     nlohmann::ordered_json j;
     j["format_version"] = format::version;
     j["exposure"] = d.exposure;
-    j["bytes"] = {{"file", file_bytes},          {"device", cost.device()}, {"base_lightmap", cost.base_lightmap},
-                  {"dynamic", cost.dynamic},     {"local_grids", 0},        {"global_grid", 0},
-                  {"ancillary", cost.ancillary}, {"meshes", cost.meshes}};
+    j["bytes"] = {{"file", file_bytes},
+                  {"device", cost.device()},
+                  {"base_lightmap", cost.base_lightmap},
+                  {"dynamic", cost.dynamic},
+                  {"local_grids", localGridBytes(d)},
+                  {"global_grid", globalGridBytes(d)},
+                  {"ancillary", cost.ancillary},
+                  {"meshes", cost.meshes}};
     uint64_t texels = 0;
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n) texels += cost.overlap_histogram[n];
     const size_t global_probes = d.probes.global.positions.size();
     j["receivers"] = {
         {"texels", texels}, {"local_probes", d.probes.base.size() - global_probes}, {"global_probes", global_probes}};
+    j["probe_levels"] = probesByLevel(d.probes.global);
+    j["tetrahedra"] = d.probes.global.tetrahedra.size();
     j["pages"] = nlohmann::ordered_json::array();
     for (uint32_t p = 0; p < d.page_count; ++p)
         j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
@@ -98,6 +177,7 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
         "pages: {} of {} x {} texels; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n",
         d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
+    printGrid(d);
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,

@@ -2,6 +2,7 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 #include <gpu/headless_device.h>
+#include <pack/pack_data.h>
 #include <pipeline/sample_points.h>
 
 #include <fmt/format.h>
@@ -20,7 +21,13 @@ Expected<LightPages> pagesOnCpu(const Pack& pack, const std::string& state) {
     if (auto ok = runtime.apply(state); !ok) return std::unexpected(ok.error());
     runtime.update();
     return LightPages{{runtime.irradiancePages().begin(), runtime.irradiancePages().end()},
-                      {runtime.directionPages().begin(), runtime.directionPages().end()}};
+                      {runtime.directionPages().begin(), runtime.directionPages().end()},
+                      {runtime.probes().begin(), runtime.probes().end()}};
+}
+
+std::vector<uint32_t> cookedProbes(const Pack& pack) {
+    const CpuRuntime runtime(pack);
+    return {runtime.probes().begin(), runtime.probes().end()};
 }
 
 Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
@@ -32,7 +39,9 @@ Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
     if (auto ok = runtime->submit(); !ok) return std::unexpected(ok.error());
     auto pages = runtime->readPages();
     if (!pages) return std::unexpected(pages.error());
-    return LightPages{std::move(pages->irradiance), std::move(pages->direction)};
+    // Without dynamic light on any probe the runtime has none of its own: they are as cooked.
+    if (pages->probes.empty()) pages->probes = cookedProbes(pack);
+    return LightPages{std::move(pages->irradiance), std::move(pages->direction), std::move(pages->probes)};
 }
 
 int run(const Arguments& a) {
@@ -42,7 +51,11 @@ int run(const Arguments& a) {
     if (!points) return reportError(points.error());
     const auto pages = a.backend == "gpu" ? pagesOnGpu(*pack, a.state) : pagesOnCpu(*pack, a.state);
     if (!pages) return reportError(pages.error());
-    const auto samples = sampleSurface(*pack, *pages, *points);
+    if (a.from == "grid" && pack->data().probes.global.empty())
+        return reportError({ErrorCode::BadInput, a.pack +
+                                                     ": the pack has no global grid; cook it with grids.probes_max "
+                                                     "above 0, or take --from surface."});
+    const auto samples = a.from == "grid" ? sampleGrid(*pack, *pages, *points) : sampleSurface(*pack, *pages, *points);
     if (auto ok = writeSamples(a.output, *points, samples); !ok) return reportError(ok.error());
     size_t missed = 0;
     for (const auto& s : samples) missed += !s;
@@ -65,8 +78,9 @@ void addSampleCommand(CLI::App& app, int& exit_code) {
         "weights: a light set's name = scalar or r/g/b (1: as baked), door:NAME = 0 closed .. 1 open; e.g. "
         "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1, doors 0. all=0 turns every set "
         "off first");
-    c->add_option("--from", a->from, "surface: the lightmap at the nearest surface within 10 cm")
-        ->check(CLI::IsMember({"surface"}))
+    c->add_option("--from", a->from,
+                  "surface: the lightmap at the nearest surface within 10 cm; grid: the light probes, anywhere")
+        ->check(CLI::IsMember({"surface", "grid"}))
         ->capture_default_str();
     c->add_option("--backend", a->backend, "who blends the pages: cpu or gpu (Vulkan)")
         ->check(CLI::IsMember({"cpu", "gpu"}))
@@ -74,7 +88,8 @@ void addSampleCommand(CLI::App& app, int& exit_code) {
     c->add_option("-o,--output", a->output, "CSV to write, with Er,Eg,Eb in lux added; - for stdout")
         ->capture_default_str();
     c->footer(
-        "Points without a lightmapped surface within 10 cm that faces along their normal get nan.\n"
+        "Points without a lightmapped surface within 10 cm that faces along their normal get nan; the grid has light\n"
+        "everywhere.\n"
         "Example: dimmer sample house.dimmer --points in.csv --state \"all=0,hall=1\" > out.csv");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }

@@ -27,8 +27,11 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
     };
     row("surface", r.surface);
     row("tilted", r.tilted);
-    fmt::print("\nerror = |E - E_ref| / (E_ref + {:.4g} lux); tilted: normals within {:.0f} degrees of the surface's\n",
-               r.floor_lux, static_cast<double>(tilt_max_deg));
+    if (r.grid.points > 0) row("grid", r.grid);
+    fmt::print(
+        "\nerror = |E - E_ref| / (E_ref + {:.4g} lux); tilted: normals within {:.0f} degrees of the surface's; "
+        "grid: anywhere in the open\n",
+        r.floor_lux, static_cast<double>(tilt_max_deg));
     fmt::print("{:.1f} M paths: {}\n", static_cast<double>(r.paths) / 1e6,
                r.converged ? "converged (the reference's error is at most a tenth of what is measured)"
                            : fmt::format("not converged within {} paths per point; what the noise adds is taken off",
@@ -64,6 +67,7 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     j["floor_lux"] = r.floor_lux;
     j["surface"] = toJson(r.surface);
     j["tilted"] = toJson(r.tilted);
+    j["grid"] = toJson(r.grid);
     j["causes"] = r.causes;
     j["sets"] = nlohmann::ordered_json::array();
     for (const FormatError& f : r.formats)

@@ -5,6 +5,7 @@
 #include <bake/final_gather.h>
 #include <bake/group_light.h>
 #include <bake/series.h>
+#include <probes/grid_bake.h>
 
 #include <atomic>
 
@@ -19,13 +20,13 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
-        FinalGather gather(gatherer);
+        FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
         std::vector<uint32_t> terms;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
             series.activeTerms(i, terms);
-            if (!groups[always_group]) std::erase(terms, always_group);
+            std::erase_if(terms, [&](uint32_t t) { return !groups[gatherer.paths().terms()[t].group]; });
             row.clear();
             if (!settings.per_set_passes) traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row);
             for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
@@ -55,13 +56,19 @@ Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sp
     });
 }
 
-// Fills `baked` with the light of the groups whose turn it is. Returns the bounces per group.
+// Fills `baked` with the light of the groups whose turn it is, and with the global grid, which needs the bounces of all
+// groups. Returns the bounces per group.
 std::vector<uint32_t> bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
                                  std::span<const uint8_t> groups, Progress& progress, Baked& baked) {
-    Series series = expandSeries(gatherer, settings, progress, groups);
+    const std::vector<uint8_t> all(groups.size(), 1);
+    const bool with_grid = settings.grid.probes_max > 0;
+    Series series = expandSeries(gatherer, settings, progress, with_grid ? all : groups);
     baked.rays = series.rays;
     baked.door_flux = doorFlux(gatherer, series, settings, groups, progress);
     baked.light = gatherAll(gatherer, series, settings, groups, progress, baked.rays);
+    if (with_grid)
+        if (auto grid = bakeGrid(gatherer, series, settings, progress, baked); !grid)
+            baked.warnings.push_back("no global grid: " + grid.error().message);
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
     std::vector<uint32_t> bounces = std::move(series.bounces);
@@ -87,7 +94,7 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
     baked.terms = paths.terms();
     baked.reports.resize(paths.termCount());
     baked.door_flux.resize(paths.groupCount());
-    if (std::ranges::count(missing, 1) > 0) {
+    if (settings.grid.probes_max > 0 || std::ranges::count(missing, 1) > 0) {
         const EmitterSampler emitters(rays, meshGroups(rays.scene()));
         const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
         const std::vector<uint32_t> bounces = bakeGroups(gatherer, settings, missing, progress, baked);
@@ -97,6 +104,8 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
         baked.light = Sparse<ReceiverLight>::Builder(texels.size()).finish();
     }
     addGroups(found, baked);
+    for (size_t i = 0; i < baked.grid.light.rows(); ++i)
+        for (const ProbeTermLight& l : baked.grid.light.row(i)) ++baked.reports[l.term].receivers;
     baked.dependent_doors = dependentDoors(baked.door_flux, settings);
     if (baked.bounces == settings.bounces_max)
         baked.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");

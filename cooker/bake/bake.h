@@ -3,6 +3,7 @@
 
 #include <bake/gather.h>
 #include <bake/progress.h>
+#include <pack/grid_data.h>
 
 #include <cstdint>
 #include <optional>
@@ -10,6 +11,17 @@
 #include <vector>
 
 namespace dimmer::cook {
+
+// The global grid: see probes/placement.h.
+struct GridSettings {
+    uint32_t probes_max = 0;     // 0: no grid
+    float min_spacing_m = 0.3f;  // of probes that see each other; twice that outside of play areas, where there are any
+    uint32_t sites = 16;         // per probe, where light is traced: for placing probes, and for fitting their light
+    float tolerance = 0.05f;     // no probe where interpolation misses the light by less than this share of it
+    bool uniform = false;        // a lattice of about probes_max probes instead: to measure placement against
+    bool fit = true;  // false: probes keep the light that was traced at them, for measuring what the fit is worth
+    bool visibility = true;  // false: without tables of what probes see, for measuring them
+};
 
 struct BakeSettings {
     uint32_t series_rays = 32;     // per texel, for the bounces; kept as 4-byte links while the series runs
@@ -32,16 +44,21 @@ struct BakeSettings {
     // together when pairs of doors are judged. Empty: as the scene has them.
     std::vector<float> group_brightness = {};
 
+    GridSettings grid = {};
+
     float thresholdOf(uint32_t group) const { return group_thresholds.empty() ? threshold : group_thresholds[group]; }
 };
 
 // What is stored for one (receiver, term).
-struct ReceiverLight {
+template <class Light>
+struct LightOfTerm {
     uint32_t term = 0;
-    Gathered light;
+    Light light;
     float variance = 0;  // of the luminance of the irradiance, lux^2; Monte Carlo noise alone
     float keep = 0;      // the largest activity threshold at which it is stored; infinite for always-on light
 };
+using ReceiverLight = LightOfTerm<Gathered>;
+using ProbeTermLight = LightOfTerm<ProbeLight>;
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
 // the receivers that see one of the doors, by what is stored; the threshold of those is at least their group's own, and
@@ -53,6 +70,12 @@ struct TermReport {
     float threshold_lux = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
     double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1
+};
+
+struct BakedGrid {
+    GlobalGrid grid;               // empty: there is none
+    Sparse<ProbeTermLight> light;  // per position of the grid: always-on light first, then the active terms
+    double free_volume_m3 = 0;     // of the level: what lies in the open
 };
 
 // Two doors whose light needs both, while no combination covers them.
@@ -74,12 +97,13 @@ struct DoorFlux {
 };
 
 struct Baked {
-    Sparse<ReceiverLight> light;            // per receiver: always-on light first, then the active terms
-    std::vector<Term> terms;                // as DoorPaths lists them
-    std::vector<TermReport> reports;        // per term
-    uint32_t bounces = 0;                   // of the light group that took most
-    uint64_t rays = 0;                      // traced, not remembered
-    std::vector<DoorFlux> door_flux;        // per light group
+    Sparse<ReceiverLight> light;      // per receiver: always-on light first, then the active terms
+    std::vector<Term> terms;          // as DoorPaths lists them
+    std::vector<TermReport> reports;  // per term
+    uint32_t bounces = 0;             // of the light group that took most
+    uint64_t rays = 0;                // traced, not remembered
+    std::vector<DoorFlux> door_flux;  // per light group
+    BakedGrid grid;
     std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
 };

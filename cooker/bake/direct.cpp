@@ -16,41 +16,43 @@ constexpr float sun_distance_m = 1e30f;
 
 }  // namespace
 
-uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, size_t receiver,
-                     TermAccumulator<Gathered>& reflected, TermAccumulator<Gathered>& stored) {
+template <class Light>
+uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const GatherFrom& from,
+                     TermAccumulator<Light>& reflected, TermAccumulator<Light>& stored) {
     const RayScene& rays = gatherer.rays();
-    const Texels& texels = gatherer.texels();
     const DoorPaths& paths = gatherer.paths();
-    const uint32_t own = gatherer.conditionOf(receiver);
-    const auto seed = static_cast<uint32_t>(receiver);
-    const uint32_t points = texels.sampleCount(receiver);
-    const glm::vec3 place = texels.sample(receiver, 0).position_m;
+    const auto points = static_cast<uint32_t>(from.points.size());
+    const glm::vec3 place = from.points[0].position_m;
     uint64_t traced = 0;
     grid.forEach(place, [&](uint32_t l) {
         const PunctualLight& light = rays.scene().lights[l];
-        const uint32_t first = hash(grid.identity(l), seed) % points;
+        const uint32_t first = hash(grid.identity(l), from.id) % points;
         const bool near = light.type == LightType::Directional || glm::distance(light.position_m, place) < near_m;
         const uint32_t used = near ? points : 1;
         for (uint32_t i = 0; i < used; ++i) {
-            const SamplePoint& p = texels.sample(receiver, (first + i) % points);
-            const TangentFrame& frame = gatherer.unwrap().frames[p.face];
+            const SamplePoint& p = from.points[(first + i) % points];
             const Illumination lit = illuminate(light, p.position_m);
-            const float cos_surface = glm::dot(frame.normal, lit.towards_light);
-            if (!(cos_surface > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
+            const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
+            const float weight = Light::Intake::weight(direction);
+            if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
             ++traced;
             const float distance_m = std::isinf(lit.distance_m) ? sun_distance_m : lit.distance_m;
-            const glm::vec3 direction(glm::dot(lit.towards_light, frame.tangent),
-                                      glm::dot(lit.towards_light, frame.bitangent), cos_surface);
-            forEachWay(rays, paths, own, p.position_m, lit.towards_light, distance_m, [&](float passed, uint32_t path) {
-                const uint32_t term = paths.term(groupOf(light.light_set), path);
-                if (term == no_term) return;
-                const glm::vec3 lux = lit.irradiance_lux * (cos_surface * passed / static_cast<float>(used));
-                reflected[term].add(lux, direction);
-                if (light.bake == BakeMode::Full) stored[term].add(lux, direction);
-            });
+            forEachWay(rays, paths, from.condition, p.position_m, lit.towards_light, distance_m,
+                       [&](float passed, uint32_t path) {
+                           const uint32_t term = paths.term(groupOf(light.light_set), path);
+                           if (term == no_term) return;
+                           const glm::vec3 lux = lit.irradiance_lux * (weight * passed / static_cast<float>(used));
+                           reflected[term].add(lux, direction);
+                           if (light.bake == BakeMode::Full) stored[term].add(lux, direction);
+                       });
         }
     });
     return traced;
 }
+
+template uint64_t directLight(const Gatherer&, const LightGrid&, const GatherFrom&, TermAccumulator<Gathered>&,
+                              TermAccumulator<Gathered>&);
+template uint64_t directLight(const Gatherer&, const LightGrid&, const GatherFrom&, TermAccumulator<ProbeLight>&,
+                              TermAccumulator<ProbeLight>&);
 
 }  // namespace dimmer::cook

@@ -146,6 +146,7 @@ DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint
 }
 
 Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal) {
+    const bool everywhere = normal == glm::vec3(0);
     float patches = 0, door = 0;
     for (size_t b = 0; b < boxes.size(); ++b) {
         Target t{boxes[b].low - point, boxes[b].high - point, 0, glm::vec3(0), glm::vec3(0)};
@@ -162,9 +163,10 @@ Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal)
         const glm::vec3 highest(normal.x > 0 ? t.high.x : t.low.x, normal.y > 0 ? t.high.y : t.low.y,
                                 normal.z > 0 ? t.high.z : t.low.z);
         // A patch on the point's own surface sends nothing there.
-        if (!(seen > 0) || !(glm::dot(highest, normal) > (b == 0 ? 0 : 2 * inflate_m))) continue;
+        if (!(seen > 0)) continue;
+        if (!everywhere && !(glm::dot(highest, normal) > (b == 0 ? 0 : 2 * inflate_m))) continue;
         t.side_chance /= seen;
-        const float cosine = std::max(cosine_min, glm::dot(centre, normal) / std::sqrt(distance2));
+        const float cosine = everywhere ? 1 : std::max(cosine_min, glm::dot(centre, normal) / std::sqrt(distance2));
         const float area_m2 = std::max(t.side_area_m2.x, std::max(t.side_area_m2.y, t.side_area_m2.z));
         t.chance = b == 0 ? 1 : boxes[b].flux / area_m2 * seen * cosine;
         (b == 0 ? door : patches) += t.chance;

@@ -45,6 +45,7 @@ class DoorGuides {
 // uniform over a side. From outside a box, every direction into it passes exactly one such side.
 class Guide {
    public:
+    // `normal`: boxes below its horizon are left out; zero: none are.
     Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal);
     // Nothing in sight: no box lies above the horizon, or the point is inside of all that do.
     bool empty() const { return count_ == 0; }

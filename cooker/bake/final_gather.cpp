@@ -30,20 +30,24 @@ FinalGatherOptions finalGatherOptions(const BakeSettings& settings, std::span<co
             .floor_lux = floors_lux};
 }
 
-void FinalGather::State::add(const Gathered& round) {
+template <class Light>
+void FinalGather<Light>::State::add(const Light& round) {
     sum += round;
     ++rounds;
-    const float value = luminance(round.irradiance_lux), step = value - mean;
+    const float value = luminance(round.irradiance()), step = value - mean;
     mean += step / static_cast<float>(rounds);
     squares += step * (value - mean);
 }
 
-float FinalGather::State::varianceOfMean() const {
+template <class Light>
+float FinalGather<Light>::State::varianceOfMean() const {
     return rounds < 2 ? 0 : squares / static_cast<float>(rounds * (rounds - 1));
 }
 
 // At the doors that the terms are about.
-void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options) {
+template <class Light>
+void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> terms,
+                             const FinalGatherOptions& options) {
     aims_.clear();
     for (uint32_t t : terms) {
         const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
@@ -52,13 +56,16 @@ void FinalGather::aim(const GatherFrom& from, std::span<const uint32_t> terms, c
     }
 }
 
-void FinalGather::want(uint32_t term, bool wanted) {
+template <class Light>
+void FinalGather<Light>::want(uint32_t term, bool wanted) {
     round_.setWanted(term, wanted);
     wanted_in_group_[gatherer_.paths().terms()[term].group] += wanted ? 1u : UINT32_MAX;
 }
 
-uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
-                             const FinalGatherOptions& options, std::vector<ReceiverLight>& out) {
+template <class Light>
+uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint32_t> terms,
+                                    const SparseLight& outgoing, const FinalGatherOptions& options,
+                                    std::vector<LightOfTerm<Light>>& out) {
     for (uint32_t t : terms) {
         state_[t] = {};
         want(t, true);
@@ -96,5 +103,8 @@ uint64_t FinalGather::gather(const GatherFrom& from, std::span<const uint32_t> t
     }
     return traced;
 }
+
+template class FinalGather<Gathered>;
+template class FinalGather<ProbeLight>;
 
 }  // namespace dimmer::cook

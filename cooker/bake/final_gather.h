@@ -24,7 +24,8 @@ FinalGatherOptions finalGatherOptions(const BakeSettings& settings, std::span<co
 // Rays come in rounds of this many; the spread of the rounds' means is the noise.
 inline constexpr uint32_t rays_per_round = 32;
 
-// One worker's scratch; not thread-safe, make one per thread.
+// One worker's scratch; not thread-safe, make one per thread. Light: Gathered for texels, ProbeLight for probes.
+template <class Light>
 class FinalGather {
    public:
     explicit FinalGather(const Gatherer& gatherer)
@@ -38,16 +39,16 @@ class FinalGather {
     // Appends to `out` the light of `terms` (ascending) at `from`. Rays are shared, decisions are not: a term's
     // value and sample count do not depend on which other terms are asked for. Returns the rays traced.
     uint64_t gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
-                    const FinalGatherOptions& options, std::vector<ReceiverLight>& out);
+                    const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out);
 
    private:
     struct State {
-        Gathered sum;
+        Light sum;
         float mean = 0, squares = 0;  // Welford, over rounds, of the luminance
         uint32_t rounds = 0;
         bool done = false;
 
-        void add(const Gathered& round);
+        void add(const Light& round);
         float varianceOfMean() const;
     };
     void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
@@ -55,7 +56,7 @@ class FinalGather {
 
     const Gatherer& gatherer_;
     std::vector<DoorAim> aims_;
-    TermAccumulator<Gathered> round_;  // wants the terms that are not done
+    TermAccumulator<Light> round_;  // wants the terms that are not done
     std::vector<State> state_;
     std::vector<uint32_t> wanted_in_group_;
 };

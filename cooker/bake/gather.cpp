@@ -2,6 +2,7 @@
 
 #include <bake/door_rays.h>
 #include <bake/sampling.h>
+#include <probes/spherical_harmonics.h>
 
 #include <algorithm>
 #include <array>
@@ -12,10 +13,6 @@ namespace {
 constexpr float far_away_m = 1e30f;
 // Shadow rays stop this short of the emitter they aim at, so as not to hit it.
 constexpr float shadow_end_share = 1 - 1e-4f;
-
-glm::vec3 toTangent(const TangentFrame& f, glm::vec3 d) {
-    return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
-}
 
 // Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
 uint32_t firstSample(const GatherOptions& options) {
@@ -33,33 +30,59 @@ void Gathered::add(glm::vec3 lux, glm::vec3 direction_tangent) {
     tilted_lux += luminance(lux) * glm::max(glm::vec4(slope, -slope) + tilt_cos, 0.0f);
 }
 
+void ProbeLight::add(glm::vec3 lux, glm::vec3 d) {
+    const auto y = sphericalHarmonics({d.x, d.y, d.z});
+    for (size_t i = 0; i < 9; ++i) radiance[i] += lux * y[i];
+}
+
+glm::vec3 ProbeLight::irradiance(glm::vec3 n) const {
+    const auto y = sphericalHarmonics({n.x, n.y, n.z});
+    glm::vec3 sum(0);
+    for (size_t i = 0; i < 9; ++i) sum += radiance[i] * (cosine_bands[bandOf(i)] * y[i]);
+    return sum;
+}
+
+template <class Light>
 struct Gatherer::Ray {
+    using Intake = typename Light::Intake;
+    float density() const { return static_cast<float>(options.rays) * Intake::weight(tangent) / Intake::total; }
     const GatherFrom& from;
     const GatherOptions& options;
     const SparseLight* outgoing;
-    TermAccumulator<Gathered>& sum;
+    TermAccumulator<Light>& sum;
     GatherLinks* links;
     std::span<const DoorAim> aims;
-    const DoorAim* aim;  // whose ray this is; null: a cosine ray
+    const DoorAim* aim;  // whose ray this is; null: a ray by the intake
     uint32_t i, point;   // in this gather; of the receiver
     glm::vec3 origin, world, tangent;
     // By guide of the first aims, once a term has asked: many terms share a guide.
     mutable std::array<float, 16> share_of_aim{};
 };
 
+TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
+    return point.face == no_face ? TangentFrame{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}} : unwrap_.frames[point.face];
+}
+
+glm::vec3 Gatherer::toTangent(const SamplePoint& point, glm::vec3 d) const {
+    if (point.face == no_face) return d;
+    const TangentFrame& f = unwrap_.frames[point.face];
+    return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
+}
+
+template <class Light>
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                      TermAccumulator<Gathered>& sum, GatherLinks* links, std::span<const DoorAim> aims) const {
+                      TermAccumulator<Light>& sum, GatherLinks* links, std::span<const DoorAim> aims) const {
     const uint32_t seed = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.rays; ++i) {
         const uint32_t index = options.first_ray + i;
         const auto point = static_cast<uint32_t>(index % from.points.size());
         const SamplePoint& origin = from.points[point];
-        const TangentFrame& frame = unwrap_.frames[origin.face];
-        const glm::vec3 d = cosineDirection(sequence2d(index, seed));
+        const TangentFrame frame = frameOf(origin);
+        const glm::vec3 d = Light::Intake::direction(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
         if (links) links->hits[i] = no_index;
-        follow({from, options, outgoing, sum, links, aims, nullptr, i, point, origin.position_m, world, d, {}},
-               seed + index);
+        follow<Light>({from, options, outgoing, sum, links, aims, nullptr, i, point, origin.position_m, world, d, {}},
+                      seed + index);
     }
     for (size_t a = 0; a < aims.size(); ++a) gatherAimed(from, options, outgoing, sum, aims, a);
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
@@ -74,12 +97,14 @@ uint32_t Gatherer::guideOf(uint32_t term) const {
 DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
     DoorAim aim{guide, {}};
     for (const SamplePoint& p : from.points)
-        aim.from_point.emplace_back(guides_.boxes(guide), p.position_m, unwrap_.frames[p.face].normal);
+        aim.from_point.emplace_back(guides_.boxes(guide), p.position_m,
+                                    p.face == no_face ? glm::vec3(0) : unwrap_.frames[p.face].normal);
     return aim;
 }
 
+template <class Light>
 void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                           TermAccumulator<Gathered>& sum, std::span<const DoorAim> aims, size_t a) const {
+                           TermAccumulator<Light>& sum, std::span<const DoorAim> aims, size_t a) const {
     const DoorAim& aim = aims[a];
     // Seeded by the guide alone: what else is aimed at does not change its noise.
     const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), guides_.identity(aim.guide));
@@ -92,27 +117,28 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
         if (guide.empty()) continue;
         const glm::vec3 u = sequence3d(index, seed);
         const glm::vec3 world = guide.sample(u.z, {u.x, u.y});
-        const glm::vec3 d = toTangent(unwrap_.frames[origin.face], world);
-        if (!(d.z > 0)) continue;
-        follow({from,
-                options,
-                outgoing,
-                sum,
-                nullptr,
-                aims,
-                &aim,
-                options.rays + i,
-                point,
-                origin.position_m,
-                world,
-                d,
-                {}},
-               seed + index);
+        const glm::vec3 d = toTangent(origin, world);
+        if (!(Light::Intake::weight(d) > 0)) continue;
+        follow<Light>({from,
+                       options,
+                       outgoing,
+                       sum,
+                       nullptr,
+                       aims,
+                       &aim,
+                       options.rays + i,
+                       point,
+                       origin.position_m,
+                       world,
+                       d,
+                       {}},
+                      seed + index);
     }
 }
 
 // Traces a ray and takes what it finds.
-void Gatherer::follow(const Ray& ray, uint32_t seed) const {
+template <class Light>
+void Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
     const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls);
     const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
     if (path == no_path) return;
@@ -124,8 +150,9 @@ void Gatherer::follow(const Ray& ray, uint32_t seed) const {
 
 // From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
 // have found it there.
-float Gatherer::shareOf(const Ray& ray, uint32_t term) const {
-    const float alone = pi / static_cast<float>(ray.options.rays);
+template <class Light>
+float Gatherer::shareOf(const Ray<Light>& ray, uint32_t term) const {
+    const float alone = Light::Intake::total / static_cast<float>(ray.options.rays);
     const uint32_t guide = ray.aims.empty() ? no_guide : guide_of_term_[term];
     if (ray.aim && ray.aim->guide != guide) return 0;
     if (guide == no_guide) return alone;
@@ -133,24 +160,25 @@ float Gatherer::shareOf(const Ray& ray, uint32_t term) const {
     if (aim == ray.aims.end() || aim->from_point[ray.point].empty()) return alone;
     const auto index = static_cast<size_t>(aim - ray.aims.begin());
     if (index < ray.share_of_aim.size() && ray.share_of_aim[index] > 0) return ray.share_of_aim[index];
-    const float by_cosine = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
     const float by_aim = static_cast<float>(aimed_rays) * aim->from_point[ray.point].pdf(ray.world);
-    const float share = ray.tangent.z / (by_cosine + by_aim);
+    const float share = Light::Intake::weight(ray.tangent) / (ray.density() + by_aim);
     if (index < ray.share_of_aim.size()) ray.share_of_aim[index] = share;
     return share;
 }
 
-void Gatherer::takeSky(const Ray& ray, uint32_t path) const {
+template <class Light>
+void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
     const uint32_t term = paths_.term(always_group, path);
     if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
     // An image sky has rays of its own; see sampleSky.
     if (ray.aim && !sky_.empty()) return;
-    const float share = sky_.empty() ? shareOf(ray, term) : pi / static_cast<float>(ray.options.rays);
-    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.tangent.z) * share, ray.tangent);
+    const float share = sky_.empty() ? shareOf(ray, term) : Light::Intake::total / static_cast<float>(ray.options.rays);
+    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.density()) * share, ray.tangent);
 }
 
 // Takes what the leaves along a ray send back. Returns the path on which it goes on behind them.
-uint32_t Gatherer::throughLeaves(const Ray& ray, float distance_m) const {
+template <class Light>
+uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m) const {
     uint32_t path = free_path;
     for (const Hit& hit : rays_.leavesAlong(ray.origin, ray.world, distance_m)) {
         const uint32_t condition = rays_.triangles()[hit.triangle].condition;
@@ -172,17 +200,18 @@ uint32_t Gatherer::throughLeaves(const Ray& ray, float distance_m) const {
 }
 
 // Takes the light of the surface at a ray's end.
-void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
+template <class Light>
+void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const {
     // Emitters have rays of their own; see sampleEmitters.
     if (const Emitter* e = emitters_.emitterOf(hit.triangle); !ray.aim && e && (!hit.back || e->double_sided)) {
         const float cos_emitter = std::abs(glm::dot(ray.world, e->normal));
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
-        const float by_hit = static_cast<float>(ray.options.rays) * ray.tangent.z / pi;
+        const float by_hit = ray.density();
         if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
-            ray.sum[term].add(
-                e->radiance_cd_m2 * (pi / static_cast<float>(ray.options.rays) * by_hit / (by_hit + by_area)),
-                ray.tangent);
+            ray.sum[term].add(e->radiance_cd_m2 * (Light::Intake::total / static_cast<float>(ray.options.rays) *
+                                                   by_hit / (by_hit + by_area)),
+                              ray.tangent);
     }
     const uint32_t found = receiverOf(unwrap_, texels_, hit);
     if (found == no_index) return;
@@ -198,28 +227,29 @@ void Gatherer::take(const Ray& ray, const Hit& hit, uint32_t path) const {
 }
 
 // The sky's radiance along a ray that hit nothing, times its share of the two ways to find it.
-glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const {
+glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float density) const {
     const glm::vec3 radiance = skyRadiance(rays_.scene(), world);
     if (sky_.empty()) return radiance;
     const float by_sky = static_cast<float>(options.emitter_samples) * sky_.pdf(radiance);
-    const float by_cosine = static_cast<float>(options.rays) * cos_surface / pi;
-    return radiance * (by_cosine / (by_cosine + by_sky));
+    return radiance * (density / (density + by_sky));
 }
 
-void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const {
+template <class Light>
+void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const {
     const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;
         const SamplePoint& origin = from.points[(index + seed) % from.points.size()];
         const SkySample s = sky_.sample(sequence2d(index, seed));
-        const glm::vec3 d = toTangent(unwrap_.frames[origin.face], s.direction);
-        if (!(s.pdf > 0) || !(d.z > 0)) continue;
+        const glm::vec3 d = toTangent(origin, s.direction);
+        if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
         const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
-        const float by_cosine = static_cast<float>(options.rays) * d.z / pi;
+        const float weight = Light::Intake::weight(d);
+        const float by_ray = static_cast<float>(options.rays) * weight / Light::Intake::total;
         forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
                        if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
-                           sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_sky + by_cosine)), d);
+                           sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), d);
                    });
     }
 }
@@ -238,32 +268,37 @@ uint32_t Gatherer::onto(uint32_t path, uint32_t own, uint32_t target) const {
     return no_path;
 }
 
-void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options,
-                              TermAccumulator<Gathered>& sum) const {
+template <class Light>
+void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
     const uint32_t any_point = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;
         const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
-        const TangentFrame& frame = unwrap_.frames[origin.face];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.identity);
             const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
-            const glm::vec3 d = toTangent(frame, s.direction);
-            if (!(s.pdf > 0) || !(d.z > 0)) continue;
-            const float by_area = samples * s.pdf, by_hit = static_cast<float>(options.rays) * d.z / pi;
+            const glm::vec3 d = toTangent(origin, s.direction);
+            if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
+            const float weight = Light::Intake::weight(d), by_area = samples * s.pdf;
+            const float by_hit = static_cast<float>(options.rays) * weight / Light::Intake::total;
             const uint32_t target = rays_.triangles()[s.triangle].condition;
             forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, s.distance_m * shadow_end_share,
                        [&](float passed, uint32_t path) {
                            const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
                            if (term != no_term && sum.wants(term))
-                               sum[term].add(s.radiance_cd_m2 * (passed * d.z / (by_area + by_hit)), d);
+                               sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)), d);
                        });
         }
     }
 }
+
+template void Gatherer::gather(const GatherFrom&, const GatherOptions&, const SparseLight*, TermAccumulator<Gathered>&,
+                               GatherLinks*, std::span<const DoorAim>) const;
+template void Gatherer::gather(const GatherFrom&, const GatherOptions&, const SparseLight*,
+                               TermAccumulator<ProbeLight>&, GatherLinks*, std::span<const DoorAim>) const;
 
 }  // namespace dimmer::cook

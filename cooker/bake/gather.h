@@ -5,12 +5,16 @@
 
 #include <bake/door_guides.h>
 #include <bake/emitters.h>
+#include <bake/sampling.h>
 #include <bake/sky.h>
 #include <bake/sparse_light.h>
 #include <charts/texels.h>
 
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <vector>
@@ -20,8 +24,22 @@ namespace dimmer::cook {
 // The tilt of Gathered's four normals: cosine and sine. The mean cosine of all normals within 60 degrees.
 inline constexpr float tilt_cos = 0.75f, tilt_sin = 0.66143783f;
 
+// How receivers take light in: density of rays = weight / total. A surface: by the cosine to its normal, +Z.
+struct SurfaceIntake {
+    static constexpr float total = std::numbers::pi_v<float>;
+    static glm::vec3 direction(glm::vec2 u) { return cosineDirection(u); }
+    static float weight(glm::vec3 d) { return d.z; }
+};
+// A probe: from all around alike, in the axes of the world.
+struct ProbeIntake {
+    static constexpr float total = 4 * std::numbers::pi_v<float>;
+    static glm::vec3 direction(glm::vec2 u) { return uniformSphereDirection(u); }
+    static float weight(glm::vec3) { return 1; }
+};
+
 // Light of one term at one receiver.
 struct Gathered {
+    using Intake = SurfaceIntake;
     glm::vec3 irradiance_lux{0};
     // Luminance of the irradiance on normals tilted towards +tangent, +bitangent, -tangent and -bitangent: how
     // irradiance falls off. Light from below the surface is left out. Adds up over contributions.
@@ -34,10 +52,33 @@ struct Gathered {
         return *this;
     }
     Gathered operator*(float s) const { return {irradiance_lux * s, tilted_lux * s}; }
+    glm::vec3 irradiance() const { return irradiance_lux; }
+};
+
+// Light of one term at a probe: radiance in spherical harmonics, as runtime/probes/spherical_harmonics.h orders them,
+// cd/m2.
+struct ProbeLight {
+    using Intake = ProbeIntake;
+    std::array<glm::vec3, 9> radiance{};
+
+    // `lux`: on a surface that faces the light.
+    void add(glm::vec3 lux, glm::vec3 direction);
+    ProbeLight& operator+=(const ProbeLight& o) {
+        for (size_t i = 0; i < 9; ++i) radiance[i] += o.radiance[i];
+        return *this;
+    }
+    ProbeLight operator*(float s) const {
+        ProbeLight out;
+        for (size_t i = 0; i < 9; ++i) out.radiance[i] = radiance[i] * s;
+        return out;
+    }
+    // The mean over all normals, lux: a quarter of what passes through a unit sphere's centre.
+    glm::vec3 irradiance() const { return radiance[0] * (0.5f * std::sqrt(std::numbers::pi_v<float>)); }
+    glm::vec3 irradiance(glm::vec3 normal) const;
 };
 
 struct GatherOptions {
-    uint32_t rays = 64;            // cosine-distributed, shared out among the texel's sample points
+    uint32_t rays = 64;            // by the receiver's intake, shared out among its sample points
     uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
@@ -51,6 +92,9 @@ struct DoorAim {
     uint32_t guide = 0;             // of DoorGuides
     std::vector<Guide> from_point;  // one per point of the receiver
 };
+
+// The face of points that lie on none: probes.
+inline constexpr uint32_t no_face = UINT32_MAX;
 
 // Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
 struct GatherFrom {
@@ -73,7 +117,7 @@ struct GatherLinks {
 // Rays per aim of a gather: an eighth of a round's.
 inline constexpr uint32_t aimed_rays = 4;
 
-// Thread-safe: gather() only reads.
+// Thread-safe: gather() only reads. Light: Gathered for surfaces, ProbeLight for probes.
 class Gatherer {
    public:
     Gatherer(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const EmitterSampler& emitters,
@@ -93,8 +137,9 @@ class Gatherer {
     // `aims`: guides that get `aimed_rays` each besides. Unbiased: emitters are found by area and by hit, an image sky
     // by its own density and by miss, what surfaces and a constant sky send through an aimed door by its rays and all
     // others, weighted by the balance heuristic (Veach 1995).
+    template <class Light>
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                TermAccumulator<Gathered>& sum, GatherLinks* links, std::span<const DoorAim> aims = {}) const;
+                TermAccumulator<Light>& sum, GatherLinks* links, std::span<const DoorAim> aims = {}) const;
     DoorAim aimAt(const GatherFrom& from, uint32_t guide) const;
     // Of the term's one door; no_guide for the others.
     uint32_t guideOf(uint32_t term) const;
@@ -109,6 +154,12 @@ class Gatherer {
         return rays_.triangles()[unwrap_.faces[texels_.sample(receiver, 0).face].triangle].condition;
     }
 
+    // Of a unit direction of the world, in the frame that the point's light is kept in; a probe's is the world's.
+    glm::vec3 toTangent(const SamplePoint& point, glm::vec3 world) const;
+    TangentFrame frameOf(const SamplePoint& point) const;
+    // A probe; `id` seeds its sequence.
+    static GatherFrom atProbe(const SamplePoint& point, uint32_t id) { return {{&point, 1}, id, no_condition}; }
+
     const RayScene& rays() const { return rays_; }
     const Unwrap& unwrap() const { return unwrap_; }
     const Texels& texels() const { return texels_; }
@@ -116,18 +167,27 @@ class Gatherer {
     const EmitterSampler& emitters() const { return emitters_; }
 
    private:
+    template <class Light>
     struct Ray;
-    uint32_t throughLeaves(const Ray& ray, float distance_m) const;
-    void take(const Ray& ray, const Hit& hit, uint32_t path) const;
-    void takeSky(const Ray& ray, uint32_t path) const;
-    void follow(const Ray& ray, uint32_t seed) const;
+    template <class Light>
+    uint32_t throughLeaves(const Ray<Light>& ray, float distance_m) const;
+    template <class Light>
+    void take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const;
+    template <class Light>
+    void takeSky(const Ray<Light>& ray, uint32_t path) const;
+    template <class Light>
+    void follow(const Ray<Light>& ray, uint32_t seed) const;
+    template <class Light>
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                     TermAccumulator<Gathered>& sum, std::span<const DoorAim> aims, size_t aim) const;
-    float shareOf(const Ray& ray, uint32_t term) const;
+                     TermAccumulator<Light>& sum, std::span<const DoorAim> aims, size_t aim) const;
+    template <class Light>
+    float shareOf(const Ray<Light>& ray, uint32_t term) const;
     uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
-    glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float cos_surface) const;
-    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const;
-    void sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Gathered>& sum) const;
+    glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float density) const;
+    template <class Light>
+    void sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const;
+    template <class Light>
+    void sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const;
 
     const RayScene& rays_;
     const Unwrap& unwrap_;

@@ -110,7 +110,7 @@ class Expansion {
             GatherLinks links;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                traced += directLight(gatherer_, grid_, i, sum, full) + options.rays;
+                traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
                     const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;

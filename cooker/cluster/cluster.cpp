@@ -1,9 +1,11 @@
 #include <cluster/cluster.h>
 
 #include <encode/encode.h>
+#include <encode/encode_probe.h>
 #include <pack/batches.h>
 
 #include <algorithm>
+#include <functional>
 #include <map>
 
 namespace dimmer::cook {
@@ -36,20 +38,85 @@ size_t pageIndex(const PackData& pack, uint32_t address) {
            TexelAddress::x(address);
 }
 
-void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receivers, PackData& pack) {
-    Cluster c{.first_receiver = static_cast<uint32_t>(pack.addresses.size()) - receivers,
-              .receiver_count = receivers,
-              .first_batch = static_cast<uint32_t>(pack.batches.size()),
-              .batch_count = 0,
-              .first_term = static_cast<uint32_t>(pack.terms.size()),
-              .term_count = static_cast<uint32_t>(contributions.size())};
-    cutIntoBatches(pack.addresses, c.first_receiver, pack.batches);
-    c.batch_count = static_cast<uint32_t>(pack.batches.size()) - c.first_batch;
-    for (uint32_t k : contributions) {
-        pack.terms.push_back({k, pack.contributions[k].receivers});  // relative to the contribution for now
-        pack.contributions[k].receivers += receivers;
+// Items (texels or probes, in the order that clusters keep) by the contributions that their light has, and by page.
+class Grouping {
+   public:
+    template <class Light>
+    void add(uint32_t item, uint32_t page, std::span<const LightOfTerm<Light>> light,
+             std::span<const uint32_t> contribution_of_term) {
+        signature_ = {{}, page};
+        for (const auto& l : light)
+            if (l.term != always_group) signature_.first.push_back(contribution_of_term[l.term]);
+        if (!signature_.first.empty()) members_[signature_].push_back(item);
     }
-    pack.clusters.push_back(c);
+
+    // Clusters by their number of contributions, as updates take them, and in their items' order among equals: what a
+    // dispatch reads lies together, and neighbours in the file are neighbours on the page.
+    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
+    using Entry = std::pair<const Signature, std::vector<uint32_t>>;
+    std::vector<const Entry*> ordered() const {
+        std::vector<const Entry*> order;
+        for (const Entry& cluster : members_) order.push_back(&cluster);
+        std::ranges::sort(order, {},
+                          [](const Entry* c) { return std::pair(c->first.first.size(), c->second.front()); });
+        return order;
+    }
+
+   private:
+    std::map<Signature, std::vector<uint32_t>> members_;  // -> items
+    Signature signature_;
+};
+
+// What clusters of one kind of receiver are told by.
+template <class Record>
+struct Tables {
+    std::vector<Cluster>& clusters;
+    std::vector<ClusterTerm>& terms;
+    std::vector<Batch>& batches;
+    std::vector<uint32_t>& receivers;  // addresses of texels, numbers of probes
+    std::vector<Record>& payload;
+};
+
+void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receivers, auto& tables,
+                   std::vector<uint32_t>& record_counts, auto&& cut) {
+    Cluster c{.first_receiver = static_cast<uint32_t>(tables.receivers.size()) - receivers,
+              .receiver_count = receivers,
+              .first_batch = static_cast<uint32_t>(tables.batches.size()),
+              .batch_count = 0,
+              .first_term = static_cast<uint32_t>(tables.terms.size()),
+              .term_count = static_cast<uint32_t>(contributions.size())};
+    cut(c.first_receiver, receivers);
+    c.batch_count = static_cast<uint32_t>(tables.batches.size()) - c.first_batch;
+    for (uint32_t k : contributions) {
+        tables.terms.push_back({k, record_counts[k]});  // relative to the contribution for now
+        record_counts[k] += receivers;
+    }
+    tables.clusters.push_back(c);
+}
+
+// `receiverOf(item)`: its address or number; `lightOf(item)`: its row; `encode(light)`: a record; `cut(first, count)`
+// appends the batches of a cluster's receivers. Returns the number of records per contribution.
+template <class Record>
+std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions,
+                                 std::span<const uint32_t> contribution_of_term, Tables<Record> tables,
+                                 auto&& receiverOf, auto&& lightOf, auto&& encode, auto&& cut) {
+    std::vector<uint32_t> record_counts(contributions, 0);
+    std::vector<std::vector<Record>> payloads(contributions);
+    for (const auto* cluster : grouping.ordered()) {
+        for (uint32_t item : cluster->second) {
+            tables.receivers.push_back(receiverOf(item));
+            for (const auto& l : lightOf(item))
+                if (l.term != always_group) payloads[contribution_of_term[l.term]].push_back(encode(l.light));
+        }
+        appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), tables, record_counts, cut);
+    }
+    std::vector<uint32_t> first_record;
+    for (const auto& payload : payloads) {
+        first_record.push_back(static_cast<uint32_t>(tables.payload.size()));
+        tables.payload.insert(tables.payload.end(), payload.begin(), payload.end());
+    }
+    for (ClusterTerm& term : tables.terms) term.first_record += first_record[term.contribution];
+    return record_counts;
 }
 
 }  // namespace
@@ -59,41 +126,44 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     const std::vector<Target> targets = listTargets(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
-    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
-    std::map<Signature, std::vector<uint32_t>> members;            // -> targets
-    Signature signature;
+    Grouping grouping;
     for (uint32_t t = 0; t < targets.size(); ++t) {
-        signature = {{}, TexelAddress::page(targets[t].address)};
-        for (const ReceiverLight& l : baked.light.row(targets[t].source)) {
+        const auto row = baked.light.row(targets[t].source);
+        grouping.add(t, TexelAddress::page(targets[t].address), row, contribution_of_term);
+        for (const ReceiverLight& l : row)
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
-            else
-                signature.first.push_back(contribution_of_term[l.term]);
-        }
-        if (!signature.first.empty()) members[signature].push_back(t);
     }
-    // Clusters by their number of contributions, as updates take them, and in page order among equals: what a dispatch
-    // reads lies together, and neighbours in the file are neighbours on the page.
-    std::vector<const std::pair<const Signature, std::vector<uint32_t>>*> order;
-    for (const auto& cluster : members) order.push_back(&cluster);
-    std::ranges::sort(order, {}, [](const auto* c) { return std::pair(c->first.first.size(), c->second.front()); });
+    const auto counts = fillTables<TexelRecord>(
+        grouping, pack.contributions.size(), contribution_of_term,
+        {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
+        [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
+        [&](const Gathered& light) { return encodeTexel(light, encoding); },
+        [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
+    for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
+}
 
-    std::vector<std::vector<TexelRecord>> payloads(pack.contributions.size());
-    for (const auto* cluster : order) {
-        for (uint32_t t : cluster->second) {
-            pack.addresses.push_back(targets[t].address);
-            for (const ReceiverLight& l : baked.light.row(targets[t].source))
-                if (l.term != always_group)
-                    payloads[contribution_of_term[l.term]].push_back(encodeTexel(l.light, encoding));
-        }
-        appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), pack);
+void buildProbeClusters(const BakedGrid& baked, std::span<const uint32_t> contribution_of_term, PackData& pack) {
+    if (baked.grid.empty()) return;
+    ProbeData& probes = pack.probes;
+    const ProbeEncoding encoding{pack.exposure, pack.color_format};
+    probes.base.assign(baked.light.rows(), encodeProbe({}, encoding));
+    Grouping grouping;
+    for (uint32_t i = 0; i < baked.light.rows(); ++i) {
+        grouping.add(i, 0, baked.light.row(i), contribution_of_term);
+        for (const ProbeTermLight& l : baked.light.row(i))
+            if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
     }
-    std::vector<uint32_t> first_record;
-    for (const auto& payload : payloads) {
-        first_record.push_back(static_cast<uint32_t>(pack.payload.size()));
-        pack.payload.insert(pack.payload.end(), payload.begin(), payload.end());
-    }
-    for (ClusterTerm& term : pack.terms) term.first_record += first_record[term.contribution];
+    probes.record_counts = fillTables<ProbeRecord>(
+        grouping, pack.contributions.size(), contribution_of_term,
+        {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{},
+        [&](uint32_t i) { return baked.light.row(i); },
+        [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
+        [&](uint32_t first, uint32_t count) {
+            for (uint32_t done = 0; done < count; done += batch_receivers_max)
+                probes.batches.push_back({first + done, std::min(batch_receivers_max, count - done)});
+        });
+    probes.global = baked.grid;
 }
 
 }  // namespace dimmer::cook

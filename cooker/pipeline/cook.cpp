@@ -207,7 +207,13 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .tail_max = quality.tolerance,
                           .threshold = profile.threshold,
                           .light_grid = quality.light_grid,
-                          .per_set_passes = quality.per_set_passes};
+                          .per_set_passes = quality.per_set_passes,
+                          .grid = {.probes_max = profile.probes_max,
+                                   .min_spacing_m = profile.global_min_spacing_m,
+                                   .sites = quality.probe_sites,
+                                   .uniform = quality.grid_baseline == "uniform",
+                                   .fit = quality.grid_baseline != "unfitted",
+                                   .visibility = quality.grid_baseline != "unseen"}};
     settings.group_thresholds.assign(1 + scene.light_sets.size(), profile.threshold);
     for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
         if (const auto own = profile.set_thresholds.find(scene.light_sets[s].name); own != profile.set_thresholds.end())
@@ -289,6 +295,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, contribution_of_term, pack);
+        buildProbeClusters(baked.grid, contribution_of_term, pack);
+        stats.free_volume_m3 = baked.grid.free_volume_m3;
         pack.meshes = levelMeshes(rays, charts, scales.emission_cd_m2);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);
@@ -394,6 +402,7 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     for (Quality* quality : {&profile->draft, &profile->preview, &profile->final}) {
         quality->per_set_passes = options.per_set_passes;
         quality->light_grid = options.light_grid;
+        quality->grid_baseline = options.grid_baseline;
     }
     CookResult result;
     Expected<Scene> scene;

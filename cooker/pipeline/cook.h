@@ -22,7 +22,10 @@ struct CookOptions {
     std::string quality = "preview";
     std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
     uint32_t threads = 0;               // 0: as many as the machine has
-    bool per_set_passes = false;       // one final gather per light group: a baseline to measure the shared one against
+    bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
+    // To measure the global grid against: "uniform" (a lattice of as many probes), "unfitted" (light as traced at the
+    // probes themselves) or "unseen" (no tables of what probes see); empty: as it should be.
+    std::string grid_baseline = {};
     bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
@@ -33,7 +36,8 @@ struct CookStats {
     std::map<std::string, double> seconds;  // per stage
     uint64_t rays = 0;
     uint32_t bounces = 0;
-    uint64_t peak_bytes = 0;  // of the whole process
+    double free_volume_m3 = 0;  // of the level, where probes may stand
+    uint64_t peak_bytes = 0;    // of the whole process
     // For `dimmer_combinations`: pairs of doors, as the level writes them, that lose light for want of it.
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> warnings;

@@ -141,7 +141,7 @@ Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const 
     options.seed = gather_seed;
     std::vector<uint32_t> all(term_count), active;
     std::iota(all.begin(), all.end(), 0u);
-    FinalGather gather(*bake.gatherer);
+    FinalGather<Gathered> gather(*bake.gatherer);
     std::vector<ReceiverLight> row;
 
     const Footprint footprint = footprintOf(bake, pack, p);

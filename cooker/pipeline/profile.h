@@ -21,10 +21,12 @@ struct Quality {
     uint32_t emitter_samples = 8;    // per 32 rays, towards each light group's emitters
     float noise = 0;                 // rays end when the 95 % interval is within this share of the light; 0: never
     uint32_t denoise = 0;            // 1: filter the noise that is left
+    uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
     bool per_set_passes = false;     // see BakeSettings; from the command line alone
     bool light_grid = true;          // likewise
+    std::string grid_baseline = {};  // likewise; see CookOptions
 };
 
 struct Profile {
@@ -36,6 +38,9 @@ struct Profile {
     DirectionModel direction_model = DirectionModel::Ahd;
     float threshold = 0.01f;                      // activity, see BakeSettings
     std::map<std::string, float> set_thresholds;  // for single light sets, by name
+    uint32_t probes_max = 20000;                  // of the global grid; 0: no grid
+    float global_min_spacing_m = 0.3f;            // between them
+    float local_spacing_m = 1.5f;                 // between the probes of a model's grid
     Quality draft, preview, final;
 
     // Where each setting's value comes from: a shipped profile's name or a file's, "level", "command line", "fit"; what

@@ -1,6 +1,7 @@
 #include <pipeline/sample_points.h>
 
 #include <dimmer/cpu_runtime.h>
+#include <dimmer/probe_grid.h>
 #include <trace/nearest_surface.h>
 #include <write/pack_writer.h>
 
@@ -83,6 +84,14 @@ std::vector<std::optional<std::array<float, 3>>> sampleSurface(const Pack& pack,
         out.push_back(sampleLightmap(pack, pages.irradiance, pages.direction, pack.meshes()[place->mesh].page,
                                      place->uv, normal));
     }
+    return out;
+}
+
+std::vector<std::optional<std::array<float, 3>>> sampleGrid(const Pack& pack, const LightPages& pages,
+                                                            std::span<const QueryPoint> points) {
+    const GridSampler grid(pack, pages.probes);
+    std::vector<std::optional<std::array<float, 3>>> out;
+    for (const auto& [p, n] : points) out.emplace_back(grid.sample({p.x, p.y, p.z}, {n.x, n.y, n.z}));
     return out;
 }
 

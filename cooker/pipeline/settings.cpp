@@ -120,6 +120,8 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
     list.push_back({prefix + "noise", &q.noise, 0, 1,
                     "rays end once the 95 % interval is within this share (0..1) of the light; 0: never early"});
     list.push_back({prefix + "denoise", &q.denoise, 0, 1, "1: filter the noise that is left; 0: keep every detail"});
+    list.push_back({prefix + "probe_sites", &q.probe_sites, 1, 256,
+                    "places per probe of the global grid at which light is traced, to choose and fit probes by"});
     list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});
     list.push_back({prefix + "tolerance", &q.tolerance, 1e-6, 1,
                     "bounces end when what is still to come is below this share (0..1) of a set's light"});
@@ -151,6 +153,14 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"lightmaps.model", &p.direction_model, 0, 0,
          "how irradiance falls off over normals: ahd is better where one lamp rules, linear where many mix"});
     list.push_back({"records.threshold", &p.threshold, 0, 1, threshold_what});
+    list.push_back({"grids.probes_max", &p.probes_max, 0, 1 << 20,
+                    "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. One per cubic "
+                    "metre of open space is never exceeded"});
+    list.push_back({"grids.global_min_spacing", &p.global_min_spacing_m, 0.1, 1000,
+                    "metres between probes of the global grid at least; light around a lamp changes over a hand's "
+                    "breadth"});
+    list.push_back({"grids.local_spacing", &p.local_spacing_m, 0.1, 100,
+                    "metres between the probes of a model's own grid; unused until local grids are baked"});
     for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}})
         addQuality(name, *q, list);
     return list;

@@ -2,8 +2,10 @@
 
 #include <bake/sampling.h>
 #include <dimmer/cpu_runtime.h>
+#include <dimmer/probe_grid.h>
 #include <format/texel.h>
 #include <pipeline/dissect.h>
+#include <probes/free_space.h>
 
 #include <fmt/format.h>
 
@@ -226,6 +228,30 @@ Expected<void> dissect(const Scene& scene, const Pack& pack, const VerifyOptions
     return {};
 }
 
+// The global grid at random places in the open, with any normal. Places that stay black do not count.
+Expected<void> verifyGrid(const ReferenceTracer& tracer, const RayScene& rays, const Pack& pack,
+                          const VerifyOptions& options, Progress& progress, VerifyReport& report) {
+    CpuRuntime runtime(pack);
+    const GridSampler grid(pack, runtime.probes());
+    if (grid.empty()) return {};
+    if (auto ok = runtime.apply(options.state); !ok) return ok;
+    runtime.update();
+    std::vector<ReferencePoint> where;
+    std::vector<double> values;
+    for (const glm::vec3 p : openPlaces(rays, options.points, hash(options.seed, 0x611du))) {
+        const glm::vec3 n = uniformSphereDirection(sequence2d(static_cast<uint32_t>(where.size()), options.seed));
+        const auto e = grid.sample({p.x, p.y, p.z}, {n.x, n.y, n.z});
+        where.push_back({p, n});
+        values.push_back(static_cast<double>(luminance(glm::vec3(e[0], e[1], e[2]))));
+    }
+    const Measured m = measure(tracer, where, values, report.floor_lux, options.paths_max, progress);
+    std::vector<LightPair> lit;
+    for (const LightPair& p : m.pairs)
+        if (p.value_lux > 0 || p.reference_lux > 0) lit.push_back(p);
+    report.grid = lightError(lit, report.floor_lux);
+    return {};
+}
+
 Expected<void> verifySets(const Scene& scene, const Pack& pack, const VerifyOptions& options, Progress& progress,
                           VerifyReport& report) {
     // Each set is one that shines alone with every door closed: what the pack stores for it.
@@ -324,7 +350,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     report.points = choosePoints(pack, rays, state->door_open, options.points, options.seed);
     if (report.points.empty()) return fail(ErrorCode::BadInput, "The pack has no lightmapped surface in sight.");
 
-    progress.stage("reference", 5 * report.points.size());
+    progress.stage("reference", 7 * report.points.size());
     const auto floor_lux = keepLit(rays, pack, options.seed, report.points, progress);
     if (!floor_lux) return std::unexpected(floor_lux.error());
     const auto own_queries = queries(report.points, false), tilted_queries = queries(report.points, true);
@@ -341,6 +367,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     report.tilted = at_tilted.figures;
     report.surface_pairs = at_surface.pairs;
     report.converged = reached(report.surface) && reached(report.tilted);
+    if (auto ok = verifyGrid(tracer, rays, pack, options, progress, report); !ok) return std::unexpected(ok.error());
     for (const Measured* m : {&at_surface, &at_tilted})
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
     report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);

@@ -60,6 +60,7 @@ struct SetReport {
 
 struct VerifyReport {
     ErrorFigures surface, tilted;
+    ErrorFigures grid;  // at random places in the open, any normal; no points where the pack has no global grid
     // The reference's standard error is at most a tenth of the measured error.
     bool converged = false;
     std::map<std::string, double> causes;  // mean error by cause

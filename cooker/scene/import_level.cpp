@@ -12,7 +12,9 @@
 #include <scene/sky.h>
 
 #include <algorithm>
+#include <glm/gtc/matrix_transform.hpp>
 #include <new>
+#include <numeric>
 #include <stdexcept>
 
 namespace dimmer::cook {
@@ -81,6 +83,8 @@ class LevelImporter {
         const auto play_area = extras.flag("dimmer_play_area");
         if (!play_area) return std::unexpected(play_area.error());
         if (*play_area && at.singular != -1) return singular(at, owner);
+        if (*play_area)
+            if (const auto ok = playArea(at); !ok) return ok;
 
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
@@ -89,6 +93,29 @@ class LevelImporter {
         if (node.mesh < 0 && !shines)
             if (const auto ok = withoutMeshOrLight(at, extras, owner); !ok) return ok;
         if (node.camera >= 0 || node.name == player_start) return viewpoint(at);
+        return {};
+    }
+
+    // The cube -1..1 of the node, or the box of its mesh.
+    Expected<void> playArea(const PlacedNode& at) {
+        glm::dvec3 centre(0), half(1);
+        const int mesh_index = model_.nodes[static_cast<size_t>(at.node)].mesh;
+        if (mesh_index >= 0) {
+            std::vector<size_t> all(model_.meshes[static_cast<size_t>(mesh_index)].primitives.size());
+            std::iota(all.begin(), all.end(), size_t{0});
+            const auto mesh = meshes_->import(at.node, all, glm::dmat4(1));
+            if (!mesh) return std::unexpected(mesh.error());
+            if (mesh->positions_m.empty()) return {};
+            glm::dvec3 low(mesh->positions_m[0]), high = low;
+            for (const glm::vec3& p : mesh->positions_m) {
+                low = glm::min(low, glm::dvec3(p));
+                high = glm::max(high, glm::dvec3(p));
+            }
+            centre = 0.5 * (low + high);
+            half = glm::max(0.5 * (high - low), 1e-3);  // a flat mesh has a box too
+        }
+        const glm::dmat4 world_from_box = glm::scale(glm::translate(at.world_from_node, centre), half);
+        scene_.play_areas.push_back({glm::mat4(glm::inverse(world_from_box))});
         return {};
     }
 

@@ -104,6 +104,15 @@ struct SceneViewpoint {
     float vertical_fov_rad = 1.0f;
 };
 
+// Where players move: a box.
+struct PlayArea {
+    glm::mat4 box_from_world{1};  // onto -1..1 on each axis
+    bool contains(glm::vec3 point_m) const {
+        const glm::vec3 p = glm::abs(glm::vec3(box_from_world * glm::vec4(point_m, 1)));
+        return p.x <= 1 && p.y <= 1 && p.z <= 1;
+    }
+};
+
 // Names one element: index into light_sets or doors.
 struct ElementRef {
     bool is_door = false;
@@ -121,7 +130,8 @@ struct Scene {
     std::vector<std::vector<ElementRef>> combinations;
     std::vector<SceneViewpoint> viewpoints;   // "player_start" first when there is one, then glTF cameras
     std::vector<glm::vec3> dynamic_places_m;  // dimmer_dynamic on an empty node
-    glm::vec3 sky_radiance_cd_m2{0};          // of the whole sky; with an image: what its texels are multiplied by
+    std::vector<PlayArea> play_areas;
+    glm::vec3 sky_radiance_cd_m2{0};  // of the whole sky; with an image: what its texels are multiplied by
     // Equirectangular, rows from the top (+Y); the middle column is +X, to its right comes +Z. Null: a constant sky.
     std::shared_ptr<const Image> sky_image;
     std::string settings;               // of the cook, as the level has them: "key=value, key=value"

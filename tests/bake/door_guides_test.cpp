@@ -73,7 +73,7 @@ TEST(DoorGuides, AreUnbiasedAndLessNoisyAtEqualRays) {
     constexpr uint32_t seeds = 96, aimed_rounds = 8;
     // 36 rays a round with those at the door, 32 without.
     static_assert(aimed_rounds * (rays_per_round + aimed_rays) == 9 * rays_per_round);
-    FinalGather gather(gatherer);
+    FinalGather<Gathered> gather(gatherer);
     double total[2] = {}, variance[2] = {}, relative[2] = {}, log_gain = 0, bias_variance = 0;
     size_t receivers = 0;
     for (size_t i = 0; i < b.texels.size(); i += 11) {

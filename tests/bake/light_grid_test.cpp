@@ -103,7 +103,7 @@ Direct directOf(const BakedScene& b, bool enabled) {
     const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
     TermAccumulator<Gathered> reflected(paths.termCount()), stored(paths.termCount());
     for (size_t i = 0; i < b.texels.size(); ++i) {
-        out.rays += directLight(gatherer, grid, i, reflected, stored);
+        out.rays += directLight(gatherer, grid, gatherer.at(i), reflected, stored);
         auto& row = out.rows.emplace_back();
         for (const uint32_t g : reflected.touched()) row.emplace_back(g, reflected[g].irradiance_lux);
         reflected.clear();

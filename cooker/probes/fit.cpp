@@ -1,0 +1,91 @@
+#include <probes/fit.h>
+
+#include <cstddef>
+
+namespace dimmer::cook {
+namespace {
+
+// What is traced at a probe itself counts as much as this share of its sites.
+constexpr float prior_share = 0.05f;
+constexpr int steps = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
+
+using Vector = std::vector<FitValue>;
+
+// One conjugate gradient for each of the 27 right-hand sides, side by side.
+class Solver {
+   public:
+    Solver(std::span<const FitSite> sites, size_t probes) : sites_(sites), diagonal_(probes, 0), prior_(probes) {
+        for (const FitSite& s : sites)
+            for (size_t k = 0; k < 4; ++k) diagonal_[s.probes[k]] += s.importance * s.shares[k] * s.shares[k];
+        for (size_t i = 0; i < probes; ++i) {
+            prior_[i] = diagonal_[i] > 0 ? prior_share * diagonal_[i] : 1;
+            diagonal_[i] += prior_[i];
+        }
+    }
+
+    void solve(std::span<const FitValue> targets, std::span<FitValue> x) const {
+        const size_t n = x.size();
+        Vector residual(n, FitValue{}), image(n), direction(n);
+        for (size_t s = 0; s < sites_.size(); ++s) {
+            FitValue missing = targets[s];
+            accumulate(missing, sites_[s], x, -1);
+            scatter(missing, sites_[s], residual);
+        }
+        FitValue power{};
+        for (size_t i = 0; i < n; ++i)
+            for (size_t c = 0; c < 27; ++c) {
+                direction[i][c] = residual[i][c] / diagonal_[i];
+                power[c] += residual[i][c] * direction[i][c];
+            }
+        for (int step = 0; step < steps; ++step) {
+            apply(direction, image);
+            FitValue curvature{}, next{};
+            for (size_t i = 0; i < n; ++i)
+                for (size_t c = 0; c < 27; ++c) curvature[c] += direction[i][c] * image[i][c];
+            FitValue length;
+            for (size_t c = 0; c < 27; ++c) length[c] = curvature[c] > 0 ? power[c] / curvature[c] : 0;
+            for (size_t i = 0; i < n; ++i)
+                for (size_t c = 0; c < 27; ++c) {
+                    x[i][c] += length[c] * direction[i][c];
+                    residual[i][c] -= length[c] * image[i][c];
+                    next[c] += residual[i][c] * residual[i][c] / diagonal_[i];
+                }
+            for (size_t i = 0; i < n; ++i)
+                for (size_t c = 0; c < 27; ++c) {
+                    const float turn = power[c] > 0 ? next[c] / power[c] : 0;
+                    direction[i][c] = residual[i][c] / diagonal_[i] + turn * direction[i][c];
+                }
+            power = next;
+        }
+    }
+
+   private:
+    static void accumulate(FitValue& sum, const FitSite& s, std::span<const FitValue> x, float sign) {
+        for (size_t k = 0; k < 4; ++k)
+            for (size_t c = 0; c < 27; ++c) sum[c] += sign * s.shares[k] * x[s.probes[k]][c];
+    }
+    static void scatter(const FitValue& value, const FitSite& s, Vector& out) {
+        for (size_t k = 0; k < 4; ++k)
+            for (size_t c = 0; c < 27; ++c) out[s.probes[k]][c] += s.importance * s.shares[k] * value[c];
+    }
+    void apply(const Vector& x, Vector& out) const {
+        for (size_t i = 0; i < x.size(); ++i)
+            for (size_t c = 0; c < 27; ++c) out[i][c] = prior_[i] * x[i][c];
+        for (const FitSite& s : sites_) {
+            FitValue sum{};
+            accumulate(sum, s, x, 1);
+            scatter(sum, s, out);
+        }
+    }
+
+    std::span<const FitSite> sites_;
+    std::vector<float> diagonal_, prior_;
+};
+
+}  // namespace
+
+void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes) {
+    Solver(sites, probes.size()).solve(targets, probes);
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,204 @@
+// The light of baked probes, against closed forms.
+#include <bake/baked_scene.h>
+#include <bake/test_scenes.h>
+#include <gtest/gtest.h>
+#include <pipeline/small_level.h>
+#include <probes/placement.h>
+#include <probes/spherical_harmonics.h>
+#include <probes/tetrahedron_walk.h>
+#include <probes/visibility.h>
+#include <tbb/task_arena.h>
+
+#include <cmath>
+#include <numeric>
+
+namespace dimmer::cook::test {
+namespace {
+
+BakeSettings settingsWithGrid(uint32_t probes = 60) {
+    BakeSettings settings;
+    settings.final_rays = 256;
+    settings.grid.probes_max = probes;
+    return settings;
+}
+
+glm::vec3 positionOf(const GlobalGrid& grid, size_t i) {
+    return {grid.positions[i].x_m, grid.positions[i].y_m, grid.positions[i].z_m};
+}
+
+// Inwards, `low` to `high`.
+void addRoom(Scene& scene, glm::vec3 low, glm::vec3 high, uint32_t material) {
+    const size_t first = scene.meshes.size();
+    addBox(scene, 0.5f * (high - low), material);
+    for (size_t i = first; i < scene.meshes.size(); ++i)
+        for (glm::vec3& p : scene.meshes[i].positions_m) p += 0.5f * (low + high);
+}
+
+// Walls that emit 100 cd/m2 and reflect half: L = 100 / (1 - 0.5) from everywhere, so L_00 = L sqrt(4 pi) and nothing
+// else. Corners of the grid's box stand outside and have the light of a probe.
+TEST(GridBake, Furnace) {
+    Scene scene;
+    addBox(scene, {2, 1.5f, 2}, addMaterial(scene, emissive(glm::vec3(100, 50, 0), 0.5f)));
+    BakedScene level(scene);
+    level.bake(settingsWithGrid());
+    const BakedGrid& grid = level.baked.grid;
+    ASSERT_GE(grid.light.rows(), 9u);                       // even light needs few
+    EXPECT_NEAR(grid.free_volume_m3, 4 * 3 * 4, 0.2 * 48);  // all but what lies within 5 cm of a wall
+    const float l00 = 200 * std::sqrt(4 * pi);
+    for (size_t i = 0; i < grid.light.rows(); ++i) {
+        ASSERT_EQ(grid.light.row(i).size(), 1u);
+        const ProbeLight& light = grid.light.row(i)[0].light;
+        // The series stops at 0.2 % of the sum; 32 links per texel are even light exactly.
+        EXPECT_NEAR(light.radiance[0].x, l00, 0.01f * l00) << i;
+        EXPECT_NEAR(light.radiance[0].y, 0.5f * l00, 0.01f * l00) << i;
+        EXPECT_EQ(light.radiance[0].z, 0);
+        // Noise of a thousand even rays: 3 %, of low discrepancy less.
+        for (size_t k = 1; k < 9; ++k) EXPECT_NEAR(light.radiance[k].x / l00, 0, 0.03) << i << " " << k;
+    }
+}
+
+// A lamp baked in full among black walls: each probe that sees it has I / d^2 from one direction, in the set's term;
+// a lamp that renderers draw themselves leaves nothing.
+TEST(GridBake, DirectLightOfFullLampsAlone) {
+    for (const BakeMode mode : {BakeMode::Full, BakeMode::Indirect}) {
+        Scene scene;
+        addBox(scene, {3, 1.5f, 3}, addMaterial(scene, lambert(0)));
+        scene.light_sets.push_back({"lamp", 1});
+        addPointLight(scene, {0.5f, 0.5f, 0}, 100, mode).light_set = 0;
+        BakedScene level(scene);
+        BakeSettings settings = settingsWithGrid();
+        settings.grid.fit = false;  // what is traced at the probe itself
+        level.bake(settings);
+        const BakedGrid& grid = level.baked.grid;
+        size_t checked = 0;
+        for (size_t i = 0; i + 8 < grid.light.rows(); ++i)
+            for (const ProbeTermLight& l : grid.light.row(i)) {
+                const glm::vec3 towards = glm::vec3(0.5f, 0.5f, 0) - positionOf(grid.grid, i);
+                const float lux = mode == BakeMode::Full ? 100 / glm::dot(towards, towards) : 0;
+                const glm::vec3 d = glm::normalize(towards);
+                const auto y = sphericalHarmonics({d.x, d.y, d.z});
+                for (size_t k = 0; k < 9; ++k)
+                    EXPECT_NEAR(l.light.radiance[k].x, l.term == 1 ? lux * y[k] : 0, 1e-4f * lux) << i;
+                checked += l.term == 1;
+            }
+        EXPECT_GE(checked, mode == BakeMode::Full ? 16u : 0u);
+    }
+}
+
+// Two rooms, a wall of 10 cm, one lamp: what points of the dark room get, as a share of the lit room's mean.
+double leak(bool visibility) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addRoom(scene, {0, 0, 0}, {4, 2.6f, 4}, white);
+    addRoom(scene, {4.1f, 0, 0}, {8.1f, 2.6f, 4}, white);
+    addPointLight(scene, {2, 2, 2}, 100, BakeMode::Full);
+    BakedScene level(scene, 2);
+    BakeSettings settings = settingsWithGrid();
+    settings.grid.visibility = visibility;
+    level.bake(settings);
+    const BakedGrid& baked = level.baked.grid;
+    double lit = 0, dark = 0;
+    for (uint32_t i = 0; i < 2000; ++i) {
+        const glm::vec3 u = sequence3d(i, 3), in_room = glm::vec3(0.05f) + u * glm::vec3(3.9f, 2.5f, 3.9f);
+        const glm::vec3 normal = uniformSphereDirection(sequence2d(i, 4));
+        for (const bool other : {false, true}) {
+            const glm::vec3 p = in_room + glm::vec3(other ? 4.1f : 0, 0, 0);
+            const GridPlace place = locate(baked.grid, {p.x, p.y, p.z});
+            const auto weights = probeWeights(baked.grid, place);
+            float lux = 0;
+            for (size_t k = 0; k < 4; ++k)
+                lux +=
+                    weights[k] *
+                    baked.light.row(baked.grid.tetrahedra[place.tetrahedron].probes[k])[0].light.irradiance(normal).x;
+            (other ? dark : lit) += static_cast<double>(std::max(lux, 0.0f));
+        }
+    }
+    return dark / lit;
+}
+
+TEST(GridBake, LightStaysInItsRoom) {
+    const double with = leak(true), without = leak(false);
+    printf("leak through a wall of 10 cm: %.2f %% of the lit room's mean, without visibility %.2f %%\n", 100 * with,
+           100 * without);
+    EXPECT_LE(with, 0.01);
+    EXPECT_GE(without, 0.02);  // the test can tell
+}
+
+TEST(GridBake, IsTheSameOnAnyNumberOfThreads) {
+    Scene scene;
+    addBox(scene, {3, 1.5f, 3}, addMaterial(scene, lambert(0.6f)));
+    addPointLight(scene, {0.5f, 0.5f, 0}, 100, BakeMode::Full);
+    std::vector<std::vector<glm::vec3>> light(2);
+    std::vector<std::vector<Tetrahedron>> tetrahedra(2);
+    for (const int threads : {1, 4}) {
+        tbb::task_arena arena(threads);
+        arena.execute([&] {
+            BakedScene level(scene);
+            level.bake(settingsWithGrid());
+            const size_t run = threads == 1 ? 0 : 1;
+            tetrahedra[run] = level.baked.grid.grid.tetrahedra;
+            for (size_t i = 0; i < level.baked.grid.light.rows(); ++i)
+                for (const ProbeTermLight& l : level.baked.grid.light.row(i))
+                    light[run].insert(light[run].end(), l.light.radiance.begin(), l.light.radiance.end());
+        });
+    }
+    EXPECT_EQ(tetrahedra[0], tetrahedra[1]);
+    EXPECT_EQ(light[0], light[1]);
+    EXPECT_FALSE(light[0].empty());
+}
+
+// A wall across a tetrahedron: what stands before it is seen, what stands behind is not, to within the 1/127 of the
+// field.
+TEST(Visibility, EndsAtAWall) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "wall", {1, 0, 0}, {0, 0, 9}, {0, 9, 0}, white);  // the plane x = 1
+    const RayScene rays(scene);
+    const std::array<glm::vec3, 4> corners = {glm::vec3(0, 0, 0), {3, 0, 0}, {0, 2, 0}, {2, 0, 2}};
+    const TetrahedronVisibility table = findVisibility(rays, corners, {true, true, true, true});
+    GlobalGrid grid;
+    grid.tetrahedra.resize(1);
+    grid.visibility = {table};
+    for (uint32_t i = 0; i < 500; ++i) {
+        glm::vec4 b(unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)), unitFloat(hash(i, 4)));
+        b /= b.x + b.y + b.z + b.w;
+        const float x = 3 * b.y + 2 * b.w;
+        if (std::abs(x - 1) < 0.05f) continue;  // 1/127 of the longest distance, 2 m, for each of two roundings
+        const auto weights = probeWeights(grid, {0, {b.x, b.y, b.z, b.w}});
+        for (size_t v = 0; v < 4; ++v)
+            EXPECT_EQ(weights[v] > 0, (corners[v].x < 1) == (x < 1)) << "probe " << v << " at x = " << x;
+    }
+}
+
+TEST(Visibility, InTheOpenEverythingIsSeen) {
+    Scene scene;
+    addFloor(scene, 9, addMaterial(scene, lambert(0.5f)), -1);
+    const RayScene rays(scene);
+    const std::array<glm::vec3, 4> corners = {glm::vec3(0, 0, 0), {3, 0, 0}, {0, 2, 0}, {2, 0, 2}};
+    const TetrahedronVisibility open = findVisibility(rays, corners, {true, true, true, true});
+    for (const auto& row : open.seen) EXPECT_EQ(row, (std::array<int8_t, 4>{127, 127, 127, 127}));
+    // A corner of the box that stands in geometry sees nothing.
+    const TetrahedronVisibility blind = findVisibility(rays, corners, {true, true, false, true});
+    for (const int8_t value : blind.seen[2]) EXPECT_LT(value, 0);
+}
+
+// A node's cube, turned by no angle: 2 to 6 by 0 to 2 by -3 to 3.
+TEST(PlayAreas, AreBoxes) {
+    LevelFile level;
+    level.addNode({{"name", "room"}, {"mesh", addRoomMesh(level, {0, 0, 0}, 2, addWhite(level))}});
+    const int node = level.addNode({{"name", "play"}, {"extras", {{"dimmer_play_area", 1}}}});
+    level.node(node)["translation"] = {4, 1, 0};
+    level.node(node)["scale"] = {2, 1, 3};
+    const auto scene = level.import();
+    ASSERT_TRUE(scene) << scene.error().message;
+    ASSERT_EQ(scene->play_areas.size(), 1u);
+    const PlayArea& area = scene->play_areas[0];
+    EXPECT_TRUE(area.contains({2.1f, 0.1f, -2.9f}));
+    EXPECT_TRUE(area.contains({5.9f, 1.9f, 2.9f}));
+    EXPECT_FALSE(area.contains({6.1f, 1, 0}));
+    EXPECT_FALSE(area.contains({4, 2.1f, 0}));
+    EXPECT_FALSE(area.contains({4, 1, 3.1f}));
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

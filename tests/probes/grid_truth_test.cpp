@@ -1,0 +1,53 @@
+// Light in the open, from a cooked pack's probes, against an independent path tracer. Skipped where its files are
+// absent.
+#include <bake/sampling.h>
+#include <pipeline/cooked_level.h>
+#include <pipeline/truth_file.h>
+
+namespace dimmer::cook::test {
+namespace {
+
+ErrorFigures gridErrorAgainst(const Pack& pack, const std::string& state, const std::vector<TruthPoint>& truth,
+                              double floor_lux) {
+    CpuRuntime runtime(pack);
+    EXPECT_TRUE(runtime.apply(state));
+    runtime.update();
+    const LightPages pages{{}, {}, {runtime.probes().begin(), runtime.probes().end()}};
+    const auto light = sampleGrid(pack, pages, placesOf(truth));
+    std::vector<LightPair> pairs;
+    for (size_t i = 0; i < truth.size(); ++i) {
+        const auto& e = *light[i];
+        pairs.push_back({0.2126 * static_cast<double>(e[0]) + 0.7152 * static_cast<double>(e[1]) +
+                             0.0722 * static_cast<double>(e[2]),
+                         truth[i].lux, truth[i].error_lux});
+    }
+    return lightError(pairs, floor_lux);
+}
+
+// With at most one probe per cubic metre. The goal here is a mean of 8 % and a 95th percentile of 25 %, which draft
+// misses by a little (docs/measurements.md); the bounds are what is asked of levels that nobody here made.
+TEST(GridTruth, TwoRooms) {
+    if (!std::filesystem::exists(truth_folder)) GTEST_SKIP() << "the reference irradiance is not here";
+    const auto scene = importLevel(levels_folder / "two_rooms.glb");
+    ASSERT_TRUE(scene) << scene.error().message;
+    SilentProgress progress;
+    CookStats stats;
+    auto data = cookScene(*scene, *loadProfile("desktop"), "draft", progress, stats);
+    ASSERT_TRUE(data) << data.error().message;
+    const auto pack = Pack::fromData(std::move(*data));
+    ASSERT_TRUE(pack) << pack.error().message;
+    EXPECT_LE(static_cast<double>(pack->data().probes.base.size()), stats.free_volume_m3);
+    const double floor_lux = truthFloor(readTruth("two_rooms.free.all_on"));
+    for (const auto& [name, state] : {std::pair("all_on", ""), {"all_off", "all=0"}, {"door_0", "door:mid=1"}}) {
+        const auto truth = readTruth(std::string("two_rooms.free.") + name);
+        const ErrorFigures f = gridErrorAgainst(*pack, state, truth, floor_lux);
+        printf("two_rooms %s in the open, at draft: mean %.2f %%, p95 %.2f %%, bias %+.2f %%\n", name, 100 * f.mean,
+               100 * f.p95, 100 * f.bias);
+        EXPECT_EQ(f.points, truth.size());
+        EXPECT_LE(f.mean, 0.12) << name;
+        EXPECT_LE(f.p95, 0.40) << name;
+    }
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
