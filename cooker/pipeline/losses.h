@@ -23,8 +23,9 @@ struct Loss {
     double energy = 0;   // share of the groups' stored light
 };
 
-// Records of a bake by the rung at which they go. A receiver counts once for every texel that shows it. Errors are those
-// of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that 1 %.
+// Records of a bake by the rung at which they go. A receiver counts once for every texel that shows it. Errors are
+// those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that
+// 1 %.
 class LossTable {
    public:
     LossTable() = default;
