@@ -30,9 +30,10 @@ struct EntryHeader {
 };
 constexpr std::array<char, 8> entry_magic = {'D', 'I', 'M', 'C', 'A', 'C', 'H', '1'};
 
-std::vector<std::byte> readFile(const fs::path& path) {
+// Nothing where there is no such file.
+std::optional<std::vector<std::byte>> readFile(const fs::path& path) {
     std::ifstream file(path, std::ios::binary | std::ios::ate);
-    if (!file) return {};
+    if (!file) return std::nullopt;
     std::vector<std::byte> bytes(static_cast<size_t>(std::max<std::streamoff>(file.tellg(), 0)));
     file.seekg(0);
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -80,8 +81,10 @@ fs::path CacheStore::path(std::string_view kind, const Key& key) const {
 Entry CacheStore::find(std::string_view kind, const Key& key) const {
     const fs::path file = path(kind, key);
     std::error_code ignored;
-    if (!fs::exists(file, ignored)) return {};
-    auto bytes = decode(readFile(file));
+    // One look alone: between two another cook's trim may remove it.
+    const auto content = readFile(file);
+    if (!content) return {};
+    auto bytes = decode(*content);
     if (!bytes) return {Find::Damaged, {}};
     fs::last_write_time(file, fs::file_time_type::clock::now(), ignored);
     return {Find::Hit, std::move(*bytes)};
