@@ -15,7 +15,7 @@ constexpr uint32_t tries_per_place = 64;
 bool inTheOpen(const RayScene& rays, glm::vec3 point_m) {
     uint32_t hits = 0, backs = 0;
     for (uint32_t i = 0; i < rays_per_test; ++i) {
-        const auto hit = rays.nearest(point_m, uniformSphereDirection(sequence2d(i, 1)), 1e30f, i);
+        const auto hit = rays.nearest(point_m, uniformSphereDirection(sequence2d(i, 1)), far_away_m, i);
         if (!hit) continue;
         if (hit->distance_m < clearance_m) return false;
         ++hits;

@@ -15,6 +15,9 @@ namespace dimmer::cook {
 // "Door d stands closed" is condition 2 d, "stands open" 2 d + 1; the other one of a pair is `condition ^ 1`.
 inline constexpr uint32_t no_condition = UINT32_MAX;
 
+// Beyond every level: how far a ray goes that nothing stops.
+inline constexpr float far_away_m = 1e30f;
+
 // A triangle of the level in the one order that all stages share: meshes in scene order, then triangles.
 struct LevelTriangle {
     uint32_t mesh = 0;
