@@ -3,6 +3,7 @@
 #include <bake/final_gather.h>
 #include <bake/sampling.h>
 #include <probes/placement.h>
+#include <probes/tetrahedra.h>
 
 #include <algorithm>
 
@@ -77,10 +78,6 @@ class GridGather {
     TermAccumulator<ProbeLight> sum_, direct_, stored_;
     std::vector<uint32_t> active_;
 };
-
-glm::vec3 vec(const ProbePosition& p) {
-    return {p.x_m, p.y_m, p.z_m};
-}
 
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
