@@ -163,8 +163,7 @@ TEST_F(Fit, DensityIsNotSaidToSaveMoreThanItDoes) {
     const auto predicted = static_cast<double>(remedy.saves);
     printf("density: predicted %.0f bytes, saved %.0f of %.0f\n", predicted, saved,
            static_cast<double>(before.device()));
-    // Pages are rectangles that charts do not fill, and padding stays: a quarter of what is saved either way. By the
-    // square of the density alone it was twice what is saved.
+    // Pages are rectangles that charts do not fill, and padding stays: a quarter of what is saved either way.
     EXPECT_NEAR(predicted, saved, 0.25 * saved);
 }
 
