@@ -112,8 +112,10 @@ class Parser {
 
     Expected<void> needGrid(std::string_view what) const {
         if (GridSampler(pack_, {}).empty())
-            return fail(ErrorCode::BadInput,
-                        fmt::format("{} need a global light grid, and the pack has none: cook it with one", what));
+            return fail(
+                ErrorCode::BadInput,
+                fmt::format("{} need a global light grid, and the pack has none: cook it with --set grids.global=on",
+                            what));
         return {};
     }
 

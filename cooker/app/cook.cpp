@@ -48,6 +48,16 @@ nlohmann::ordered_json cacheJson(const CookStats& stats) {
     return list;
 }
 
+// Why there is no global grid; empty where there is one.
+std::string gridNote(const CookResult& result) {
+    if (!result.pack.probes.global.empty()) return {};
+    const Profile& p = result.profile;
+    if (p.global_grid == GridMode::Off) return "global grid: none, grids.global is off\n";
+    if (p.probes_max == 0) return "global grid: none, grids.probes_max is 0\n";
+    if (p.global_grid == GridMode::On) return "global grid: none could be made; see the warnings\n";
+    return "global grid: none, nothing in the level moves; --set grids.global=on makes one\n";
+}
+
 void printTable(const CookResult& result, const PackCost& cost) {
     const PackData& pack = result.pack;
     fmt::print("{}", budgetTable(pack, cost, result.profile));
@@ -55,6 +65,7 @@ void printTable(const CookResult& result, const PackCost& cost) {
                humanBytes(result.file_bytes), pack.page_count, pack.page_width, pack.page_height, pack.clusters.size(),
                pack.batches.size(), result.stats.bounces, static_cast<double>(result.stats.rays) / 1e6,
                humanBytes(result.stats.peak_bytes));
+    fmt::print("{}", gridNote(result));
     for (const Remedy& remedy : result.fitted) fmt::print("fitted: {}\n", remedy.text());
 }
 
@@ -62,8 +73,10 @@ nlohmann::ordered_json fittedJson(const CookResult& result) {
     auto list = nlohmann::ordered_json::array();
     for (const Remedy& remedy : result.fitted) {
         nlohmann::ordered_json changes;
-        for (const Change& c : remedy.changes) changes[c.key] = c.to;
-        list.push_back({{"changes", changes}, {"saves", remedy.saves}, {"error", remedy.error}});
+        // The shortest decimal that reads back as the same float.
+        for (const Change& c : remedy.changes) changes[c.key] = std::stod(fmt::format("{}", c.to));
+        list.push_back(
+            {{"changes", changes}, {"saves", remedy.saves}, {"error", std::stod(fmt::format("{:.4g}", remedy.error))}});
     }
     return list;
 }

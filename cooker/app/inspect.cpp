@@ -53,16 +53,10 @@ nlohmann::ordered_json budgetsJson(const Profile& p) {
     return {{"total", p.budget_total},
             {"base_lightmaps", p.budget_base_lightmaps},
             {"dynamic", p.budget_dynamic},
+            {"global_grid", p.budget_global_grid},
             {"per_element", p.budget_per_element}};
 }
 
-// Light, places and tables of what a game samples.
-uint64_t globalGridBytes(const PackData& d) {
-    const GlobalGrid& g = d.probes.global;
-    return g.positions.size() * (sizeof(ProbeRecord) + sizeof(ProbePosition)) +
-           g.tetrahedra.size() * sizeof(Tetrahedron) + g.visibility.size() * sizeof(TetrahedronVisibility) +
-           g.starts.size() * sizeof(uint32_t);
-}
 uint64_t localGridBytes(const PackData& d) {
     return (d.probes.base.size() - d.probes.global.positions.size()) * sizeof(ProbeRecord);
 }
@@ -108,11 +102,11 @@ std::vector<Flatness> worstTetrahedra(const GlobalGrid& grid, size_t count) {
     return all;
 }
 
-void printGrid(const PackData& d) {
+void printGrid(const PackData& d, const PackCost& cost) {
     const GlobalGrid& grid = d.probes.global;
     if (grid.empty()) return;
     fmt::print("\nglobal grid: {} probes, {} tetrahedra, {}; {} local grids, {} probes, {}\n", grid.positions.size(),
-               grid.tetrahedra.size(), humanBytes(globalGridBytes(d)), d.probes.local.size(),
+               grid.tetrahedra.size(), humanBytes(cost.global_grid), d.probes.local.size(),
                d.probes.base.size() - grid.positions.size(), humanBytes(localGridBytes(d)));
     fmt::print("{:<26} {:>12}\n", "level of refinement", "probes");
     const auto levels = probesByLevel(grid);
@@ -134,7 +128,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                   {"base_lightmap", cost.base_lightmap},
                   {"dynamic", cost.dynamic},
                   {"local_grids", localGridBytes(d)},
-                  {"global_grid", globalGridBytes(d)},
+                  {"global_grid", cost.global_grid},
                   {"ancillary", cost.ancillary},
                   {"meshes", cost.meshes}};
     uint64_t texels = 0;
@@ -177,7 +171,7 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
         "pages: {} of {} x {} texels; exposure {}; {} clusters; {} batches of {:.1f} receivers on average\n",
         d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
-    printGrid(d);
+    printGrid(d, cost);
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,

@@ -52,9 +52,8 @@ int run(const SampleArguments& a) {
     const auto pages = a.backend == "gpu" ? pagesOnGpu(*pack, a.state) : pagesOnCpu(*pack, a.state);
     if (!pages) return reportError(pages.error());
     if (a.from == "grid" && pack->data().probes.global.empty())
-        return reportError({ErrorCode::BadInput, a.pack +
-                                                     ": the pack has no global grid; cook it with grids.probes_max "
-                                                     "above 0, or take --from surface."});
+        return reportError({ErrorCode::BadInput, a.pack + ": the pack has no global grid; cook it with --set "
+                                                          "grids.global=on, or take --from surface."});
     const auto samples = a.from == "grid" ? sampleGrid(*pack, *pages, *points) : sampleSurface(*pack, *pages, *points);
     if (auto ok = writeSamples(a.output, *points, samples); !ok) return reportError(ok.error());
     size_t missed = 0;

@@ -28,7 +28,10 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
     };
     row("surface", r.surface);
     row("tilted", r.tilted);
-    if (r.grid.points > 0) row("grid", r.grid);
+    if (r.grid.points > 0)
+        row("grid", r.grid);
+    else
+        fmt::print("{:<22} the pack has none, or its places are black\n", "grid");
     fmt::print(
         "\nerror = |E - E_ref| / (E_ref + {:.4g} lux); tilted: normals within {:.0f} degrees of the surface's; "
         "grid: anywhere in the open\n",

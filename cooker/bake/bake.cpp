@@ -56,60 +56,156 @@ Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sp
     });
 }
 
-// Fills `baked` with the light of the groups whose turn it is, and with the global grid, which needs the bounces of all
-// groups. Returns the bounces per group.
-std::vector<uint32_t> bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
-                                 std::span<const uint8_t> groups, Progress& progress, Baked& baked) {
-    const std::vector<uint8_t> all(groups.size(), 1);
-    const bool with_grid = settings.grid.probes_max > 0;
-    Series series = expandSeries(gatherer, settings, progress, with_grid ? all : groups);
+// Which light groups are to be baked, and which are followed only as far as the global grid needs them.
+struct Turns {
+    std::vector<uint8_t> bake, follow;
+};
+
+// What is left of the series for the global grid.
+struct FollowedLight {
+    SparseLight radiance;
+    std::vector<uint32_t> bounces;  // per group
+};
+
+// Fills `baked` with the light of the groups whose turn it is.
+FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings, const Turns& turns, Progress& progress,
+                         Baked& baked) {
+    Series series = expandSeries(gatherer, settings, progress, turns.follow);
     baked.rays = series.rays;
-    baked.door_flux = doorFlux(gatherer, series, settings, groups, progress);
-    baked.light = gatherAll(gatherer, series, settings, groups, progress, baked.rays);
-    if (with_grid)
-        if (auto grid = bakeGrid(gatherer, series, settings, progress, baked); !grid)
-            baked.warnings.push_back("no global grid: " + grid.error().message);
+    if (std::ranges::count(turns.bake, 1) > 0) {
+        baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress);
+        baked.light = gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays);
+    }
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
-    std::vector<uint32_t> bounces = std::move(series.bounces);
+    FollowedLight followed{std::move(series.radiance), std::move(series.bounces)};
     series = {};
     if (settings.denoise) baked.light = denoise(gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
     baked.light = withDirect(baked.light, direct);
     for (size_t i = 0; i < baked.light.rows(); ++i)
         for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;
-    baked.bounces = std::ranges::max(bounces);
-    return bounces;
+    baked.bounces = std::ranges::max(followed.bounces);
+    return followed;
 }
+
+// A bake step by step: what a store has need not be made.
+class Bake {
+   public:
+    Bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
+         Progress& progress, GroupStore* store)
+        : rays_(rays),
+          unwrap_(unwrap),
+          texels_(texels),
+          settings_(settings),
+          progress_(progress),
+          store_(store),
+          paths_(rays.scene()),
+          groups_(paths_.groupCount()),
+          found_(groups_),
+          radiance_(groups_) {
+        turns_ = {std::vector<uint8_t>(groups_, 1), std::vector<uint8_t>(groups_, 1)};
+    }
+
+    Baked run() {
+        findGroups();
+        baked_.terms = paths_.terms();
+        baked_.reports.resize(paths_.termCount());
+        baked_.door_flux.resize(groups_);
+        baked_.light = Sparse<ReceiverLight>::Builder(texels_.size()).finish();
+        if (settings_.grid.probes_max > 0) findGrid();
+        if (std::ranges::count(turns_.follow, 1) > 0) followGroups();
+        addGroups(found_, baked_);
+        if (sites_) makeGrid();
+        for (size_t i = 0; i < baked_.grid.light.rows(); ++i)
+            for (const ProbeTermLight& l : baked_.grid.light.row(i)) ++baked_.reports[l.term].receivers;
+        baked_.dependent_doors = dependentDoors(baked_.door_flux, settings_);
+        if (baked_.bounces == settings_.bounces_max)
+            baked_.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
+        return std::move(baked_);
+    }
+
+   private:
+    void findGroups() {
+        for (uint32_t g = 0; store_ && g < groups_; ++g)
+            if (found_[g] = store_->find(g); found_[g]) turns_.bake[g] = 0;
+        turns_.follow = turns_.bake;
+    }
+
+    // The grid as it was, or what of it must be made anew; groups of which it asks for light at new places are followed
+    // again, unless the store has what their surfaces send out.
+    void findGrid() {
+        if (store_)
+            if (auto grid = store_->findGrid()) {
+                baked_.grid = std::move(*grid);
+                return;
+            }
+        auto choice = chooseSites(rays_, settings_.grid);
+        if (!choice) return warnOfNoGrid(choice.error());
+        choice_ = std::move(*choice);
+        sites_.emplace(choice_.blocks, groups_, store_);
+        const auto asked = sites_->asked();
+        for (uint32_t g = 0; store_ && g < groups_; ++g) {
+            if (turns_.follow[g] || !asked[g]) continue;
+            radiance_[g] = store_->findRadiance(g);
+            if (!radiance_[g]) turns_.follow[g] = 1;
+        }
+    }
+
+    const Gatherer& gatherer() {
+        if (!gatherer_) {
+            emitters_.emplace(rays_, meshGroups(rays_.scene()));
+            gatherer_.emplace(rays_, unwrap_, texels_, *emitters_, paths_);
+        }
+        return *gatherer_;
+    }
+
+    void followGroups() {
+        followed_ = bakeGroups(gatherer(), settings_, turns_, progress_, baked_);
+        for (uint32_t g = 0; store_ && g < groups_; ++g) {
+            if (turns_.bake[g]) store_->keep(g, lightOfGroup(baked_, g, followed_.bounces[g]));
+            if (turns_.follow[g] && settings_.grid.probes_max > 0)
+                store_->keepRadiance(g, radianceOfGroup(followed_.radiance, paths_, g));
+        }
+    }
+
+    void makeGrid() {
+        if (std::ranges::count(sites_->asked(), 1) > 0) {
+            addRadiance(radiance_, paths_, texels_.size(), followed_.radiance);
+            baked_.rays += sites_->trace(gatherer(), followed_.radiance, baked_.reports, settings_, progress_);
+        }
+        followed_ = {};
+        auto grid = bakeGrid(rays_, choice_, sites_->take(paths_), paths_.terms(), settings_.grid, progress_);
+        if (!grid) return warnOfNoGrid(grid.error());
+        baked_.grid = std::move(*grid);
+        if (store_) store_->keepGrid(baked_.grid);
+    }
+
+    void warnOfNoGrid(const Error& error) { baked_.warnings.push_back("no global grid: " + error.message); }
+
+    const RayScene& rays_;
+    const Unwrap& unwrap_;
+    const Texels& texels_;
+    const BakeSettings& settings_;
+    Progress& progress_;
+    GroupStore* store_;
+    const DoorPaths paths_;
+    const uint32_t groups_;
+    std::vector<std::optional<GroupLight>> found_;
+    std::vector<std::optional<SparseLight>> radiance_;  // of groups that are not followed again
+    Turns turns_;
+    FollowedLight followed_;
+    SiteChoice choice_;
+    std::optional<SiteLight> sites_;  // of the grid, where it is to be made
+    std::optional<EmitterSampler> emitters_;
+    std::optional<Gatherer> gatherer_;
+    Baked baked_;
+};
 
 }  // namespace
 
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
            Progress& progress, GroupStore* store) {
-    const DoorPaths paths(rays.scene());
-    std::vector<std::optional<GroupLight>> found(paths.groupCount());
-    std::vector<uint8_t> missing(paths.groupCount(), 1);
-    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
-        if (found[g] = store->find(g); found[g]) missing[g] = 0;
-    Baked baked;
-    baked.terms = paths.terms();
-    baked.reports.resize(paths.termCount());
-    baked.door_flux.resize(paths.groupCount());
-    if (settings.grid.probes_max > 0 || std::ranges::count(missing, 1) > 0) {
-        const EmitterSampler emitters(rays, meshGroups(rays.scene()));
-        const Gatherer gatherer(rays, unwrap, texels, emitters, paths);
-        const std::vector<uint32_t> bounces = bakeGroups(gatherer, settings, missing, progress, baked);
-        for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
-            if (missing[g]) store->keep(g, lightOfGroup(baked, g, bounces[g]));
-    } else {
-        baked.light = Sparse<ReceiverLight>::Builder(texels.size()).finish();
-    }
-    addGroups(found, baked);
-    for (size_t i = 0; i < baked.grid.light.rows(); ++i)
-        for (const ProbeTermLight& l : baked.grid.light.row(i)) ++baked.reports[l.term].receivers;
-    baked.dependent_doors = dependentDoors(baked.door_flux, settings);
-    if (baked.bounces == settings.bounces_max)
-        baked.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
-    return baked;
+    return Bake(rays, unwrap, texels, settings, progress, store).run();
 }
 
 }  // namespace dimmer::cook

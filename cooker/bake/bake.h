@@ -17,7 +17,7 @@ struct GridSettings {
     uint32_t probes_max = 0;     // 0: no grid
     float min_spacing_m = 0.3f;  // of probes that see each other; twice that outside of play areas, where there are any
     uint32_t sites = 16;         // per probe, where light is traced: for placing probes, and for fitting their light
-    float tolerance = 0.05f;     // no probe where interpolation misses the light by less than this share of it
+    float tolerance = 0.07f;     // no probe where interpolation misses the light by less than this share of it
     bool uniform = false;        // a lattice of about probes_max probes instead: to measure placement against
     bool fit = true;  // false: probes keep the light that was traced at them, for measuring what the fit is worth
     bool visibility = true;  // false: without tables of what probes see, for measuring them
@@ -108,6 +108,20 @@ struct Baked {
     std::vector<std::string> warnings;
 };
 
+// Places in the open at which the global grid asks for light: all over the level, or around one lamp. See
+// probes/sites.h.
+struct SiteBlock {
+    std::vector<glm::vec3> places_m;
+    uint32_t rays = 0;  // from each place
+    bool operator==(const SiteBlock&) const = default;
+};
+
+// The light of one group at the places of a block: what is active there; `term` counts the group's own.
+struct SiteBlockLight {
+    SiteBlock block;
+    Sparse<ProbeTermLight> light;
+};
+
 // All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
 // alone, so that a store can keep it.
 struct GroupLight {
@@ -124,6 +138,17 @@ class GroupStore {
     // Groups that are found are not baked again.
     virtual std::optional<GroupLight> find(uint32_t group) = 0;
     virtual void keep(uint32_t group, const GroupLight& light) = 0;
+
+    // For the global grid. Whole, when no group's light changed but for its brightness.
+    virtual std::optional<BakedGrid> findGrid() = 0;
+    virtual void keepGrid(const BakedGrid& grid) = 0;
+    // What earlier bakes know of a group's light in the open: of some of `blocks`, which count as reused when all are
+    // known, or of others.
+    virtual std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) = 0;
+    virtual void keepSites(uint32_t group, std::span<const SiteBlockLight> light) = 0;
+    // Series::radiance, of the group's own terms: what light at new places is gathered from.
+    virtual std::optional<SparseLight> findRadiance(uint32_t group) = 0;
+    virtual void keepRadiance(uint32_t group, const SparseLight& radiance) = 0;
 };
 
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between

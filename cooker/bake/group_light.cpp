@@ -62,4 +62,35 @@ void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) 
     });
 }
 
+SparseLight radianceOfGroup(const SparseLight& radiance, const DoorPaths& paths, uint32_t group) {
+    const std::vector<uint32_t> terms = termsOfGroups(paths.terms(), paths.groupCount())[group];
+    return SparseLight::build(radiance.rows(), [&](size_t begin, size_t end, auto emit) {
+        std::vector<TermLight> row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            for (const TermLight& l : radiance.row(i))
+                if (const auto own = std::ranges::lower_bound(terms, l.term); own != terms.end() && *own == l.term)
+                    row.push_back({static_cast<uint32_t>(own - terms.begin()), l.value});
+            emit(std::span<const TermLight>(row));
+        }
+    });
+}
+
+void addRadiance(std::span<const std::optional<SparseLight>> groups, const DoorPaths& paths, size_t receivers,
+                 SparseLight& radiance) {
+    const auto terms = termsOfGroups(paths.terms(), groups.size());
+    radiance = SparseLight::build(receivers, [&](size_t begin, size_t end, auto emit) {
+        std::vector<TermLight> row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            if (radiance.rows() > 0) row.assign(radiance.row(i).begin(), radiance.row(i).end());
+            for (size_t g = 0; g < groups.size(); ++g)
+                if (groups[g])
+                    for (const TermLight& l : groups[g]->row(i)) row.push_back({terms[g][l.term], l.value});
+            std::ranges::sort(row, {}, &TermLight::term);
+            emit(std::span<const TermLight>(row));
+        }
+    });
+}
+
 }  // namespace dimmer::cook

@@ -334,8 +334,8 @@ class Expansion {
 
 }  // namespace
 
-bool Series::active(uint32_t term, float direct_lux, float bounced_lux) const {
-    const float threshold = reports[term].threshold_lux;
+bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux) {
+    const float threshold = report.threshold_lux;
     return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
            (bounced_lux > 0 && bounced_lux >= threshold);
 }

@@ -9,6 +9,10 @@
 
 namespace dimmer::cook {
 
+// Whether light is stored of a term: always-on light over free paths is. Lit directly counts once it matters as much as
+// the threshold asks of indirect light: a lamp without range lights everything in sight a little.
+bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux);
+
 struct Series {
     SparseLight direct;                   // irradiance from punctual lights, emitters and the sky, lux
     SparseLight bounced;                  // irradiance after one bounce or more, lux
@@ -21,9 +25,9 @@ struct Series {
     std::vector<uint32_t> bounces;        // per light group
     uint64_t rays = 0;
 
-    // Lit directly counts once it matters as much as the threshold asks of indirect light: a lamp without range lights
-    // everything in sight a little.
-    bool active(uint32_t term, float direct_lux, float bounced_lux) const;
+    bool active(uint32_t term, float direct_lux, float bounced_lux) const {
+        return isActive(reports[term], term, direct_lux, bounced_lux);
+    }
     // The largest threshold (BakeSettings) at which the term stays active at the receiver.
     float keepUpTo(size_t receiver, uint32_t term) const;
     // Ascending: always-on light over free paths, then what is active at the receiver.

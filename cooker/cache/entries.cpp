@@ -170,4 +170,121 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
     return group;
 }
 
+namespace {
+
+// Rows of light: counts, terms, and the values in columns of floats. Value: nothing but floats.
+template <class Entry, class Value>
+void putRows(ByteWriter& out, const Sparse<Entry>& light, Value Entry::*value) {
+    constexpr size_t floats = sizeof(Value) / sizeof(float);
+    std::vector<uint16_t> counts, terms;
+    std::vector<float> columns(light.entryCount() * floats);
+    size_t n = 0;
+    for (size_t i = 0; i < light.rows(); ++i) {
+        counts.push_back(static_cast<uint16_t>(light.row(i).size()));
+        for (const Entry& l : light.row(i)) {
+            terms.push_back(static_cast<uint16_t>(l.term));
+            const auto values = std::bit_cast<std::array<float, floats>>(l.*value);
+            for (size_t f = 0; f < floats; ++f) columns[f * light.entryCount() + n] = values[f];
+            ++n;
+        }
+    }
+    putAll(out, counts);
+    putAll(out, terms);
+    putFloats(out, columns);
+}
+
+template <class Entry, class Value>
+std::optional<Sparse<Entry>> getRows(ByteReader& in, Value Entry::*value) {
+    constexpr size_t floats = sizeof(Value) / sizeof(float);
+    const auto counts = in.getArray<uint16_t>();
+    const auto terms = in.getArray<uint16_t>();
+    const std::vector<float> columns = getFloats(in);
+    if (!in.ok() || columns.size() != terms.size() * floats) return {};
+    typename Sparse<Entry>::Builder rows(counts.size());
+    std::vector<Entry> row;
+    size_t n = 0;
+    for (size_t i = 0; i < counts.size(); ++i) {
+        row.clear();
+        if (n + counts[i] > terms.size()) return {};
+        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
+            std::array<float, floats> values;
+            for (size_t f = 0; f < floats; ++f) values[f] = columns[f * terms.size() + n];
+            Entry& entry = row.emplace_back();
+            entry.term = terms[n];
+            entry.*value = std::bit_cast<Value>(values);
+        }
+        rows.put(i, row);
+    }
+    return rows.finish();
+}
+
+void visitGrid(auto& grid, auto&& visit) {
+    visit(grid.positions);
+    visit(grid.levels);
+    visit(grid.tetrahedra);
+    visit(grid.visibility);
+    visit(grid.starts);
+}
+
+}  // namespace
+
+std::vector<std::byte> toBytes(const BakedGrid& baked) {
+    ByteWriter out;
+    visitGrid(baked.grid, [&](const auto& values) { putAll(out, values); });
+    out.put(baked.grid.start);
+    out.put(baked.free_volume_m3);
+    putRows(out, baked.light, &ProbeTermLight::light);
+    return out.take();
+}
+
+std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    BakedGrid baked;
+    visitGrid(baked.grid, [&](auto& values) { getAll(in, values); });
+    baked.grid.start = in.get<StartGrid>();
+    baked.free_volume_m3 = in.get<double>();
+    auto light = getRows<ProbeTermLight>(in, &ProbeTermLight::light);
+    if (!light || !in.atEnd()) return {};
+    baked.light = std::move(*light);
+    return baked;
+}
+
+std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites) {
+    ByteWriter out;
+    out.put(uint64_t{sites.size()});
+    for (const SiteBlockLight& s : sites) {
+        putAll(out, s.block.places_m);
+        out.put(s.block.rays);
+        putRows(out, s.light, &ProbeTermLight::light);
+    }
+    return out.take();
+}
+
+std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    std::vector<SiteBlockLight> sites;
+    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) {
+        SiteBlockLight s;
+        getAll(in, s.block.places_m);
+        s.block.rays = in.get<uint32_t>();
+        auto light = getRows<ProbeTermLight>(in, &ProbeTermLight::light);
+        if (!light || light->rows() != s.block.places_m.size()) return {};
+        s.light = std::move(*light);
+        sites.push_back(std::move(s));
+    }
+    return in.atEnd() ? std::optional(std::move(sites)) : std::nullopt;
+}
+
+std::vector<std::byte> toBytes(const SparseLight& radiance) {
+    ByteWriter out;
+    putRows(out, radiance, &TermLight::value);
+    return out.take();
+}
+
+std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    auto light = getRows<TermLight>(in, &TermLight::value);
+    return light && in.atEnd() ? std::move(light) : std::nullopt;
+}
+
 }  // namespace dimmer::cook

@@ -26,4 +26,13 @@ std::optional<ChartsEntry> chartsFromBytes(std::span<const std::byte> bytes);
 std::vector<std::byte> toBytes(const GroupLight& light);
 std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes);
 
+std::vector<std::byte> toBytes(const BakedGrid& grid);
+std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes);
+
+std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites);
+std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::byte> bytes);
+
+std::vector<std::byte> toBytes(const SparseLight& radiance);
+std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes);
+
 }  // namespace dimmer::cook

@@ -63,6 +63,13 @@ void addSky(KeyBuilder& key, const Scene& scene) {
     if (scene.sky_image) addImage(key, *scene.sky_image);
 }
 
+void addPlayAreas(KeyBuilder& key, const Scene& scene) {
+    key.add(uint64_t{scene.play_areas.size()});
+    for (const PlayArea& area : scene.play_areas)
+        for (int column = 0; column < 4; ++column)
+            for (int row = 0; row < 4; ++row) key.add(area.box_from_world[column][row]);
+}
+
 }  // namespace
 
 Key geometryKey(const Scene& scene) {
@@ -99,6 +106,7 @@ Key sceneKey(const Scene& scene) {
         add(add(key, v.position_m), v.forward);
     }
     addAll(key, scene.dynamic_places_m);
+    addPlayAreas(key, scene);
     key.add(uint64_t{scene.warnings.size()});
     for (const std::string& warning : scene.warnings) key.add(warning);
     return key.finish();
@@ -152,6 +160,21 @@ Key lampsKey(const Scene& scene, uint32_t group) {
 
 Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps) {
     return KeyBuilder("light").add(charts).add(settings).add(threshold).add(lamps).finish();
+}
+
+Key gridSettingsKey(const GridSettings& s, const Scene& scene) {
+    KeyBuilder key("grid settings");
+    key.add(s.probes_max).add(s.min_spacing_m).add(s.sites).add(s.tolerance);
+    key.add(uint32_t{s.uniform}).add(uint32_t{s.fit}).add(uint32_t{s.visibility});
+    addPlayAreas(key, scene);
+    return key.finish();
+}
+
+Key gridKey(const Key& settings, std::span<const Key> groups) {
+    KeyBuilder key("grid");
+    key.add(settings).add(uint64_t{groups.size()});
+    for (const Key& group : groups) key.add(group);
+    return key.finish();
 }
 
 }  // namespace dimmer::cook

@@ -6,6 +6,7 @@
 #include <charts/unwrap.h>
 #include <scene/scene.h>
 
+#include <span>
 #include <vector>
 
 namespace dimmer::cook {
@@ -25,7 +26,12 @@ Key bakeSettingsKey(const BakeSettings& settings);
 // The lamps and emitters of a light group, the always-on group's sky included.
 Key lampsKey(const Scene& scene, uint32_t group);
 
-// A group's finished light.
+// A group's finished light, and what else is kept of it.
 Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps);
+
+// What the global grid depends on besides the groups' light.
+Key gridSettingsKey(const GridSettings& settings, const Scene& scene);
+// The global grid. `groups`: groupKey of each.
+Key gridKey(const Key& settings, std::span<const Key> groups);
 
 }  // namespace dimmer::cook

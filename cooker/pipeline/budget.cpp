@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <probes/grid_table.h>
 #include <update/device_places.h>
 
 #include <algorithm>
@@ -36,7 +37,9 @@ PackCost costOf(const PackData& pack) {
     const DeviceBytes bytes = deviceBytesOf(pack);
     cost.base_lightmap = bytes.base_lightmap;
     cost.dynamic = bytes.dynamic;
-    cost.ancillary = bytes.ancillary;
+    const GlobalGrid& grid = pack.probes.global;
+    cost.global_grid = grid.positions.size() * sizeof(ProbeRecord) + gridTableBytes(grid);
+    cost.ancillary = bytes.ancillary - cost.global_grid;
     for (const Mesh& m : pack.meshes)
         cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
     for (uint32_t e = 0; e < pack.elements.size(); ++e) {
@@ -67,6 +70,7 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
     check("total", cost.device(), profile.budget_total);
     check("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
     check("dynamic records", cost.dynamic, profile.budget_dynamic);
+    check("global grid", cost.global_grid, profile.budget_global_grid);
     for (const ElementCost& e : cost.elements)
         check(fmt::format("element '{}'", pack.elements[e.element].name), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
@@ -108,6 +112,7 @@ std::string budgetTable(const PackData& pack, const PackCost& cost, const Profil
     };
     row("base lightmaps", cost.base_lightmap, budgets.budget_base_lightmaps);
     row("dynamic records", cost.dynamic, budgets.budget_dynamic);
+    row("global grid", cost.global_grid, budgets.budget_global_grid);
     row("ancillary", cost.ancillary, 0);
     row("total on the device", cost.device(), budgets.budget_total);
     table += fmt::format("\n{:<26} {:>12} {:>12} {:>15}  {}\n", "element", "bytes", "receivers", "energy dropped",

@@ -192,11 +192,22 @@ Baked bakeWithCache(const Charted& level, BakeSettings settings, const SetScales
         cache->dependsOn("threshold of " + describeGroup(scene, g),
                          KeyBuilder("").add(settings.thresholdOf(g)).finish());
     }
-    CachedGroups groups(*cache, scene, std::move(keys));
+    const Key grid_settings = gridSettingsKey(settings.grid, scene);
+    cache->dependsOn("settings of the grid", grid_settings);
+    const Key grid = gridKey(grid_settings, keys);
+    CachedGroups groups(*cache, scene, std::move(keys), grid);
     return bake(*level.rays, level.charts, level.texels, settings, progress, &groups);
 }
 
 }  // namespace
+
+bool wantsGrid(const Profile& profile, const Scene& scene) {
+    if (profile.global_grid != GridMode::Auto) return profile.global_grid == GridMode::On;
+    return !scene.dynamic_places_m.empty() || !scene.play_areas.empty() ||
+           std::ranges::any_of(scene.meshes, [](const SceneMesh& mesh) {
+               return mesh.lighting == Lighting::Dynamic || mesh.lighting == Lighting::LocalGrid;
+           });
+}
 
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene) {
     BakeSettings settings{.series_rays = quality.series_rays,
@@ -209,7 +220,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .threshold = profile.threshold,
                           .light_grid = quality.light_grid,
                           .per_set_passes = quality.per_set_passes,
-                          .grid = {.probes_max = profile.probes_max,
+                          .grid = {.probes_max = wantsGrid(profile, scene) ? profile.probes_max : 0,
                                    .min_spacing_m = profile.global_min_spacing_m,
                                    .sites = quality.probe_sites,
                                    .uniform = quality.grid_baseline == "uniform",
@@ -275,7 +286,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         baked = bakeWithCache(level, settings, scales, progress, cache);
         multiplyByScales(scales, baked);
         limitOverlap(baked, profile.overlap_max);
-        if (losses) *losses = LossTable(baked, texels, settings.group_thresholds);
+        if (losses) *losses = LossTable(baked, texels, settings.group_thresholds, fixedTexels(rays, charts, texels));
     }
     stats.rays = baked.rays;
     stats.bounces = baked.bounces;
@@ -362,9 +373,12 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
             std::string ways;
             for (const Remedy& remedy : remedies(*pack, cost, result.profile, losses))
                 if (std::ranges::count(ways, '\n') < remedies_named) ways += "\n  " + remedy.text();
-            return fail(ErrorCode::OverBudget, within.error().message + "; what would help:" + ways);
+            return fail(ErrorCode::OverBudget, within.error().message + (ways.empty() ? "; no setting alone would help"
+                                                                                      : "; what would help:" + ways));
         }
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses);
+        if (remedy.changes.empty())
+            return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help");
         for (const Change& c : remedy.changes)
             if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
                 return std::unexpected(ok.error());

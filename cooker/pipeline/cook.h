@@ -49,6 +49,10 @@ struct CookStats {
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats, CookCache* cache = nullptr, LossTable* losses = nullptr);
 
+// Whether this cook makes a global grid: as the profile says, and if it leaves that to the level, where something moves
+// (a mesh that is dynamic or has a local grid, `dimmer_dynamic`) or players do (`dimmer_play_area`).
+bool wantsGrid(const Profile& profile, const Scene& scene);
+
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
 
 // The profile as this cook uses it: what it says, then the level's `dimmer_settings`, then "key=value" texts. Names of

@@ -11,7 +11,8 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr std::string_view charts_kind = "charts", light_kind = "light", pack_kind = "pack", ledger_kind = "ledger";
+constexpr std::string_view charts_kind = "charts", light_kind = "light", pack_kind = "pack", ledger_kind = "ledger",
+                           grid_kind = "grid", sites_kind = "sites", radiance_kind = "radiance";
 
 std::vector<std::byte> toBytes(const PackEntry& entry) {
     format::ByteWriter out;
@@ -47,6 +48,11 @@ std::map<std::string, std::string> readLedger(std::span<const std::byte> bytes) 
     std::istringstream text(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
     for (std::string part, key; std::getline(text, part, '\t') && std::getline(text, key);) parts[part] = key;
     return parts;
+}
+
+std::vector<std::string> partsOfGroup(const std::string& what) {
+    return {
+        "code", "geometry", "settings of charts", "settings of the bake", "threshold of " + what, "lamps of " + what};
 }
 
 }  // namespace
@@ -110,14 +116,52 @@ void CookCache::keepPack(const Key& key, const PackEntry& entry) {
 }
 
 std::optional<GroupLight> CookCache::findGroup(const std::string& what, const Key& key) {
-    const auto bytes = find(
-        light_kind, what, key,
-        {"code", "geometry", "settings of charts", "settings of the bake", "threshold of " + what, "lamps of " + what});
+    const auto bytes = find(light_kind, what, key, partsOfGroup(what));
     return bytes ? groupFromBytes(*bytes) : std::nullopt;
 }
 
 void CookCache::keepGroup(const Key& key, const GroupLight& light) {
     keep(light_kind, key, cook::toBytes(light));
+}
+
+std::optional<BakedGrid> CookCache::findGrid(const Key& key, const std::vector<std::string>& parts) {
+    const auto bytes = find(grid_kind, "global grid", key, parts);
+    return bytes ? gridFromBytes(*bytes) : std::nullopt;
+}
+
+void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
+    keep(grid_kind, key, cook::toBytes(grid));
+}
+
+std::vector<SiteBlockLight> CookCache::findSites(const std::string& what, const Key& key,
+                                                 std::span<const SiteBlock> blocks) {
+    const Entry entry = store_.find(sites_kind, key);
+    std::vector<SiteBlockLight> known;
+    if (entry.find == Find::Hit) known = sitesFromBytes(entry.bytes).value_or(std::vector<SiteBlockLight>{});
+    const auto is_known = [&](const SiteBlock& block) {
+        return block.places_m.empty() || std::ranges::find(known, block, &SiteBlockLight::block) != known.end();
+    };
+    const auto new_blocks = blocks.size() - static_cast<size_t>(std::ranges::count_if(blocks, is_known));
+    std::string why;
+    if (known.empty())
+        why = whyMissing(entry.find, partsOfGroup(what));
+    else if (new_blocks > 0)
+        why = fmt::format("{} of {} groups of places are new", new_blocks, blocks.size());
+    lines_.push_back({"light at probe places: " + what, new_blocks == 0, why});
+    return known;
+}
+
+void CookCache::keepSites(const Key& key, std::span<const SiteBlockLight> sites) {
+    keep(sites_kind, key, cook::toBytes(sites));
+}
+
+std::optional<SparseLight> CookCache::findRadiance(const Key& key) {
+    const Entry entry = store_.find(radiance_kind, key);
+    return entry.find == Find::Hit ? radianceFromBytes(entry.bytes) : std::nullopt;
+}
+
+void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
+    keep(radiance_kind, key, cook::toBytes(radiance));
 }
 
 void CookCache::finish(uint64_t bytes_max) {
@@ -136,6 +180,18 @@ std::string describeGroup(const Scene& scene, uint32_t group) {
 
 std::optional<GroupLight> CachedGroups::find(uint32_t group) {
     return cache_.findGroup(describeGroup(scene_, group), keys_[group]);
+}
+
+std::optional<BakedGrid> CachedGroups::findGrid() {
+    std::vector<std::string> parts = {"settings of the grid"};
+    for (uint32_t g = 0; g < keys_.size(); ++g)
+        for (const std::string& part : partsOfGroup(describeGroup(scene_, g)))
+            if (std::ranges::find(parts, part) == parts.end()) parts.push_back(part);
+    return cache_.findGrid(grid_, parts);
+}
+
+std::vector<SiteBlockLight> CachedGroups::findSites(uint32_t group, std::span<const SiteBlock> blocks) {
+    return cache_.findSites(describeGroup(scene_, group), keys_[group], blocks);
 }
 
 }  // namespace dimmer::cook

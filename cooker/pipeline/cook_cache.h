@@ -13,7 +13,7 @@ namespace dimmer::cook {
 
 // What became of one stage.
 struct CacheLine {
-    std::string what;  // "charts", "always-on light", "light set 'hall'", "pack"
+    std::string what;  // "charts", "always-on light", "light set 'hall'", "global grid", "pack"
     bool reused = false;
     std::string why;  // it had to be made again; empty where it was reused
 };
@@ -41,6 +41,14 @@ class CookCache {
     void keepPack(const Key& key, const PackEntry& entry);
     std::optional<GroupLight> findGroup(const std::string& what, const Key& key);
     void keepGroup(const Key& key, const GroupLight& light);
+    // Of the global grid: all of it; a group's light at places where probes may stand, and what its surfaces send out.
+    // `parts`: of all groups, what the grid depends on.
+    std::optional<BakedGrid> findGrid(const Key& key, const std::vector<std::string>& parts);
+    void keepGrid(const Key& key, const BakedGrid& grid);
+    std::vector<SiteBlockLight> findSites(const std::string& what, const Key& key, std::span<const SiteBlock> blocks);
+    void keepSites(const Key& key, std::span<const SiteBlockLight> sites);
+    std::optional<SparseLight> findRadiance(const Key& key);
+    void keepRadiance(const Key& key, const SparseLight& radiance);
 
     // Ends the cook: removes old entries, and remembers what this one depended on.
     void finish(uint64_t bytes_max);
@@ -66,15 +74,26 @@ class CookCache {
 class CachedGroups final : public GroupStore {
    public:
     // `keys`: per light group.
-    CachedGroups(CookCache& cache, const Scene& scene, std::vector<Key> keys)
-        : cache_(cache), scene_(scene), keys_(std::move(keys)) {}
+    CachedGroups(CookCache& cache, const Scene& scene, std::vector<Key> keys, const Key& grid)
+        : cache_(cache), scene_(scene), keys_(std::move(keys)), grid_(grid) {}
     std::optional<GroupLight> find(uint32_t group) override;
     void keep(uint32_t group, const GroupLight& light) override { cache_.keepGroup(keys_[group], light); }
+    std::optional<BakedGrid> findGrid() override;
+    void keepGrid(const BakedGrid& grid) override { cache_.keepGrid(grid_, grid); }
+    std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
+    void keepSites(uint32_t group, std::span<const SiteBlockLight> sites) override {
+        cache_.keepSites(keys_[group], sites);
+    }
+    std::optional<SparseLight> findRadiance(uint32_t group) override { return cache_.findRadiance(keys_[group]); }
+    void keepRadiance(uint32_t group, const SparseLight& radiance) override {
+        cache_.keepRadiance(keys_[group], radiance);
+    }
 
    private:
     CookCache& cache_;
     const Scene& scene_;
     std::vector<Key> keys_;
+    Key grid_;
 };
 
 // "always-on light" or "light set 'hall'".

@@ -14,6 +14,7 @@ namespace {
 
 // The next density leaves this much room: charts do not shrink in proportion, as their padding stays.
 constexpr double density_margin = 0.97;
+constexpr double density_factor_max = 16;  // coarser pages are none
 
 // One budget that is set: what it would hold at some rungs.
 struct Limit {
@@ -22,11 +23,23 @@ struct Limit {
     std::function<uint64_t(uint32_t, uint8_t, uint8_t)> saved_by;  // group, from, to
 };
 
+bool gridIsOver(const PackCost& cost, const Profile& profile) {
+    return profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid;
+}
+
+// Bytes of PackCost::dynamic that are not texels'.
+uint64_t probeRecords(const PackCost& cost, const LossTable& losses) {
+    const uint64_t texels = losses.dynamicBytes(Rungs(losses.groupCount(), 0));
+    return cost.dynamic - std::min(cost.dynamic, texels);
+}
+
 std::vector<Limit> limitsOf(const PackData& pack, const PackCost& cost, const Profile& profile,
                             const LossTable& losses) {
     std::vector<Limit> limits;
     const auto records = [&losses](uint32_t g, uint8_t from, uint8_t to) { return losses.step(g, from, to).bytes; };
-    const auto dynamic = [&losses](const Rungs& rungs) { return losses.dynamicBytes(rungs); };
+    // Probes' records are not in the table: they are taken to stay, though thresholds drop some of them too.
+    const uint64_t of_probes = probeRecords(cost, losses);
+    const auto dynamic = [&losses, of_probes](const Rungs& rungs) { return losses.dynamicBytes(rungs) + of_probes; };
     if (profile.budget_dynamic > 0) limits.push_back({profile.budget_dynamic, dynamic, records});
     const uint64_t rest = cost.device() - cost.dynamic;
     if (profile.budget_total > 0)
@@ -64,13 +77,14 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                const std::vector<Limit>& limits, const Rungs& rungs) {
     Remedy remedy;
     const Loss loss = losses.loss(rungs);
-    remedy.saves = cost.dynamic - std::min(cost.dynamic, losses.dynamicBytes(rungs));
+    remedy.saves = cost.dynamic - std::min(cost.dynamic, losses.dynamicBytes(rungs) + probeRecords(cost, losses));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
-    remedy.fits = exceeded(limits, rungs) == nullptr;
+    remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile);
     for (uint32_t g = 1; g < rungs.size(); ++g) {
         if (rungs[g] == 0) continue;
         const float from = thresholdOf(pack, profile, g);
+        if (!(from < 1)) continue;
         remedy.changes.push_back({std::string(set_threshold_prefix) + pack.elements[g - 1].name, from,
                                   std::min(1.0f, threshold_rungs[rungs[g]] * from)});
     }
@@ -111,8 +125,9 @@ Rungs firstFitting(const LossTable& losses, const std::vector<Limit>& limits, ui
     return rungs;
 }
 
-Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses) {
-    double over = 1;
+// By how much the budgets that density helps with are exceeded; at most 1: not at all.
+double overBy(const PackCost& cost, const Profile& profile) {
+    double over = 0;
     const auto compare = [&](uint64_t bytes, uint64_t budget) {
         if (budget > 0) over = std::max(over, static_cast<double>(bytes) / static_cast<double>(budget));
     };
@@ -120,11 +135,48 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
     compare(cost.base_lightmap, profile.budget_base_lightmaps);
     compare(cost.dynamic, profile.budget_dynamic);
     for (const ElementCost& e : cost.elements) compare(e.bytes, profile.budget_per_element);
-    const double factor = std::sqrt(over) / density_margin;
-    Remedy remedy{.changes = {}, .fits = true, .saves = 0, .error = losses.densityError(factor), .energy = 0};
-    const float to = std::max(0.01f, std::floor(profile.texels_per_metre / static_cast<float>(factor) * 100) / 100);
-    remedy.changes.push_back({"lightmaps.texels_per_metre", profile.texels_per_metre, to});
-    remedy.saves = static_cast<uint64_t>(static_cast<double>(cost.device()) * (1 - 1 / (factor * factor)));
+    return over;
+}
+
+// Saves nothing where no budget that it helps with is exceeded.
+Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses) {
+    Remedy remedy;
+    const double over = overBy(cost, profile);
+    if (!(over > 1)) return remedy;
+    const double wanted = density_margin / over, factor = std::min(losses.factorFor(wanted), density_factor_max);
+    const float from = profile.texels_per_metre;
+    const float to = std::max(0.01f, std::floor(from / static_cast<float>(factor) * 100) / 100);
+    if (!(to < from)) return remedy;
+    const double left = losses.texelsLeft(static_cast<double>(from) / static_cast<double>(to));
+    remedy.changes.push_back({"lightmaps.texels_per_metre", from, to});
+    remedy.fits = left <= 1 / over && !gridIsOver(cost, profile);
+    remedy.error = losses.densityError(static_cast<double>(from) / static_cast<double>(to));
+    const uint64_t of_texels = cost.device() - cost.global_grid - probeRecords(cost, losses);
+    remedy.saves = static_cast<uint64_t>(static_cast<double>(of_texels) * (1 - left));
+    return remedy;
+}
+
+// Fewer probes, as bytes go with their number. Saves nothing where the grid is not the trouble.
+Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
+    Remedy remedy;
+    constexpr uint64_t corners = 8;  // of the grid's box, which are probes too
+    const uint64_t probes = pack.probes.global.positions.size();
+    const uint64_t bytes = cost.global_grid + (profile.budget_total > 0 ? probeRecords(cost, losses) : 0);
+    uint64_t excess = gridIsOver(cost, profile) ? cost.global_grid - profile.budget_global_grid : 0;
+    if (profile.budget_total > 0 && cost.device() > profile.budget_total)
+        excess = std::max(excess, cost.device() - profile.budget_total);
+    if (excess == 0 || excess >= bytes || probes <= corners) return remedy;
+    const double left = density_margin * (1 - static_cast<double>(excess) / static_cast<double>(bytes));
+    const auto to = static_cast<uint64_t>(left * static_cast<double>(probes));
+    if (to <= corners) return remedy;
+    remedy.changes.push_back(
+        {"grids.probes_max", static_cast<float>(profile.probes_max), static_cast<float>(to - corners)});
+    remedy.saves = static_cast<uint64_t>(static_cast<double>(cost.global_grid) *
+                                         (1 - static_cast<double>(to) / static_cast<double>(probes)));
+    Profile others = profile;
+    others.budget_total = others.budget_global_grid = 0;
+    remedy.fits = !(overBy(cost, others) > 1);
+    remedy.moves_light = true;
     return remedy;
 }
 
@@ -150,21 +202,25 @@ std::string Remedy::text() const {
         changes.size() > named_max ? fmt::format(" and {} more", changes.size() - named_max) : std::string();
     return fmt::format("{}{}: saves {:.2f} MB, adds a mean error of {:.2f} %{}", fmt::join(parts, ", "), more,
                        static_cast<double>(saves) / 1e6, 100 * error,
-                       energy > 0 ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy) : "");
+                       energy > 0    ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy)
+                       : moves_light ? ", coarsens the light of what moves"
+                                     : "");
 }
 
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses) {
     const auto limits = limitsOf(pack, cost, profile, losses);
-    std::vector<Remedy> found = {byDensity(cost, profile, losses)};
-    if (!baseIsOver(cost, profile)) {
-        const auto add = [&](const Rungs& rungs) {
-            Remedy remedy = byRungs(pack, cost, profile, losses, limits, rungs);
-            if (remedy.saves > 0) found.push_back(std::move(remedy));
-        };
-        add(greedy(losses, limits));
-        add(firstFitting(losses, limits, no_index));
-        if (const uint32_t largest = largestSet(pack, cost); largest > 0) add(firstFitting(losses, limits, largest));
+    std::vector<Remedy> found;
+    const auto add = [&](Remedy remedy) {
+        if (remedy.saves > 0 && !remedy.changes.empty()) found.push_back(std::move(remedy));
+    };
+    add(byDensity(cost, profile, losses));
+    add(byProbes(pack, cost, profile, losses));
+    if (!baseIsOver(cost, profile) && exceeded(limits, Rungs(losses.groupCount(), 0))) {
+        const auto by = [&](const Rungs& rungs) { add(byRungs(pack, cost, profile, losses, limits, rungs)); };
+        by(greedy(losses, limits));
+        by(firstFitting(losses, limits, no_index));
+        if (const uint32_t largest = largestSet(pack, cost); largest > 0) by(firstFitting(losses, limits, largest));
     }
     std::ranges::stable_sort(found, [](const Remedy& a, const Remedy& b) {
         return std::pair(!a.fits, a.error) < std::pair(!b.fits, b.error);
@@ -174,6 +230,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
 
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
     const auto limits = limitsOf(pack, cost, profile, losses);
+    if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile, losses);
     if (!baseIsOver(cost, profile)) {
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
         if (thresholds.fits && !thresholds.changes.empty()) return thresholds;

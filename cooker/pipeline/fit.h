@@ -18,14 +18,16 @@ struct Change {
 struct Remedy {
     std::vector<Change> changes;
     bool fits = false;
-    uint64_t saves = 0;  // bytes of device memory
-    double error = 0;    // mean relative error that it adds, all sets at weight 1; see LossTable
-    double energy = 0;   // of the set that loses most, the share of its stored light
+    uint64_t saves = 0;        // bytes of device memory
+    double error = 0;          // mean relative error that it adds, all sets at weight 1; see LossTable
+    double energy = 0;         // of the set that loses most, the share of its stored light
+    bool moves_light = false;  // it is the light of what moves that gets coarser, not that of lightmaps
     std::string text() const;
 };
 
 // For a pack that is over a budget: raising thresholds where the least light goes for the bytes, raising all of them,
-// raising that of the set with the most records, lowering the density. Those that fit first, then by error.
+// raising that of the set with the most records, lowering the density; fewer probes where the global grid is over, or
+// where they alone bring the total within its budget. None is empty. Those that fit first, then by error.
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 

@@ -48,8 +48,19 @@ std::vector<uint32_t> copiesOf(const Texels& texels) {
 
 }  // namespace
 
-LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds)
-    : copies_(copiesOf(texels)) {
+double fixedTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
+    const auto is_fixed = [&](size_t receiver) {
+        const uint32_t triangle = unwrap.faces[texels.sample(receiver, 0).face].triangle;
+        return rays.scene().meshes[rays.triangles()[triangle].mesh].texels_per_metre.has_value();
+    };
+    double fixed = 0;
+    for (size_t i = 0; i < texels.size(); ++i) fixed += is_fixed(i);
+    for (const FillTexel& fill : texels.fills) fixed += is_fixed(fill.source);
+    return fixed / static_cast<double>(std::max<size_t>(1, texels.size() + texels.fills.size()));
+}
+
+LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, double fixed_texels)
+    : copies_(copiesOf(texels)), fixed_texels_(fixed_texels) {
     uint32_t doors = 0;
     for (const Term& term : baked.terms) {
         steps_.resize(std::max<size_t>(steps_.size(), term.group + 1));

@@ -5,7 +5,9 @@
 #include <charts/texels.h>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -23,6 +25,9 @@ struct Loss {
     double energy = 0;   // share of the groups' stored light
 };
 
+// The share of the pages' texels whose meshes state a density of their own: they stay as many whatever the profile's.
+double fixedTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
+
 // Records of a bake by the rung at which they go. A receiver counts once for every texel that shows it. Errors are
 // those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that
 // 1 %.
@@ -30,7 +35,7 @@ class LossTable {
    public:
     LossTable() = default;
     // `thresholds`: per light group, those of the bake.
-    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds);
+    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, double fixed_texels = 0);
 
     // From the present thresholds to `rungs`.
     Loss loss(const Rungs& rungs) const;
@@ -41,7 +46,14 @@ class LossTable {
     uint64_t dynamicBytes(const Rungs& rungs) const;
     // Mean relative error of texels `factor` times as long, against those there are: of second differences of the light
     // along the pages, an eighth of which a box of a texel and bilinear filtering lose where light is smooth.
-    double densityError(double factor) const { return (factor * factor - 1) * curvature_ / 4; }
+    double densityError(double factor) const { return (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4; }
+    // Of texels `factor` times as long, the share that is left of how many there are.
+    double texelsLeft(double factor) const { return fixed_texels_ + (1 - fixed_texels_) / (factor * factor); }
+    // The factor at which `share` of them is left; infinite where none does.
+    double factorFor(double share) const {
+        return share > fixed_texels_ ? std::sqrt((1 - fixed_texels_) / (share - fixed_texels_))
+                                     : std::numeric_limits<double>::infinity();
+    }
 
     uint32_t groupCount() const { return static_cast<uint32_t>(steps_.size()); }
 
@@ -61,6 +73,7 @@ class LossTable {
     std::vector<uint32_t> copies_;                                 // texels that show a receiver
     std::vector<std::array<Step, threshold_rungs.size()>> steps_;  // per group: what goes at each rung
     double curvature_ = 0;
+    double fixed_texels_ = 0;
 };
 
 }  // namespace dimmer::cook

@@ -14,6 +14,11 @@ namespace dimmer::cook {
 const char* nameOf(ColorFormat format);
 const char* nameOf(DirectionModel model);
 
+// Whether a cook bakes the global grid. Auto: where something in the level moves; see wantsGrid() in cook.h.
+enum class GridMode { Auto, On, Off };
+
+const char* nameOf(GridMode mode);
+
 struct Quality {
     uint32_t samples_per_texel = 4;  // points of a texel that rays start from
     uint32_t series_rays = 32;       // per texel, for the bounces
@@ -31,7 +36,8 @@ struct Quality {
 
 struct Profile {
     // Bytes; 0: no limit.
-    uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_per_element = 0;
+    uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_global_grid = 0,
+             budget_per_element = 0;
     float texels_per_metre = 4;
     uint32_t page_size = 2048;
     ColorFormat color_format = ColorFormat::E5B9G9R9;
@@ -39,9 +45,10 @@ struct Profile {
     float threshold = 0.01f;                      // activity, see BakeSettings
     uint32_t overlap_max = 0;                     // contributions per receiver, see limitOverlap; 0: no limit
     std::map<std::string, float> set_thresholds;  // for single light sets, by name
-    uint32_t probes_max = 20000;                  // of the global grid; 0: no grid
-    float global_min_spacing_m = 0.3f;            // between them
-    float local_spacing_m = 1.5f;                 // between the probes of a model's grid
+    GridMode global_grid = GridMode::Auto;
+    uint32_t probes_max = 20000;        // of the global grid; 0: no grid
+    float global_min_spacing_m = 0.3f;  // between them
+    float local_spacing_m = 1.5f;       // between the probes of a model's grid
     Quality draft, preview, final;
 
     // Where each setting's value comes from: a shipped profile's name or a file's, "level", "command line", "fit"; what

@@ -24,6 +24,11 @@ constexpr const auto& namesOf(DirectionModel) {
     return direction_models;
 }
 
+constexpr std::array grid_modes = {"auto", "on", "off"};
+constexpr const auto& namesOf(GridMode) {
+    return grid_modes;
+}
+
 std::unexpected<Error> bad(const std::string& source, const std::string& text) {
     return fail(ErrorCode::BadInput, fmt::format("{}: {}", source, text));
 }
@@ -61,6 +66,7 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
         return choose(setting, **format, value, source);
     if (const auto* model = std::get_if<DirectionModel*>(&setting.target))
         return choose(setting, **model, value, source);
+    if (const auto* mode = std::get_if<GridMode*>(&setting.target)) return choose(setting, **mode, value, source);
     return assignNumber(setting, value, source);
 }
 
@@ -86,6 +92,8 @@ json schemaOf(const Setting& s) {
         out["enum"] = color_formats;
     else if (std::holds_alternative<DirectionModel*>(s.target))
         out["enum"] = direction_models;
+    else if (std::holds_alternative<GridMode*>(s.target))
+        out["enum"] = grid_modes;
     else {
         out["type"] = std::holds_alternative<float*>(s.target) ? "number" : "integer";
         out["minimum"] = s.least;
@@ -102,6 +110,10 @@ void addBudgets(Profile& p, std::vector<Setting>& list) {
                     "bytes of the lightmap pages; 0: no limit. They grow with the square of the texel density"});
     list.push_back({"budgets.dynamic", &p.budget_dynamic, 0, any,
                     "bytes of all records of light sets and doors; 0: no limit. They also bound what an update reads"});
+    list.push_back(
+        {"budgets.global_grid", &p.budget_global_grid, 0, any,
+         "bytes of the global grid's probes and of its tetrahedra; 0: no limit. The records of sets and doors at "
+         "its probes are part of budgets.dynamic"});
     list.push_back({"budgets.per_element", &p.budget_per_element, 0, any,
                     "bytes of the records that name one light set or door; 0: no limit. Keeps one lamp that lights the "
                     "whole level from eating the budget of all others"});
@@ -133,6 +145,10 @@ const char* nameOf(ColorFormat format) {
     return color_formats[static_cast<size_t>(format)];
 }
 
+const char* nameOf(GridMode mode) {
+    return grid_modes[static_cast<size_t>(mode)];
+}
+
 const char* nameOf(DirectionModel model) {
     return direction_models[static_cast<size_t>(model)];
 }
@@ -153,9 +169,14 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"lightmaps.model", &p.direction_model, 0, 0,
          "how irradiance falls off over normals: ahd is better where one lamp rules, linear where many mix"});
     list.push_back({"records.threshold", &p.threshold, 0, 1, threshold_what});
-    list.push_back({"records.overlap_max", &p.overlap_max, 0, 4096,
-                    "contributions that one texel or probe holds at most, the brightest there; 0: no limit. Bounds what "
-                    "the worst texel of an update costs"});
+    list.push_back(
+        {"records.overlap_max", &p.overlap_max, 0, 4096,
+         "contributions that one texel or probe holds at most, the brightest there; 0: no limit. Bounds what "
+         "the worst texel of an update costs"});
+    list.push_back({"grids.global", &p.global_grid, 0, 0,
+                    "whether the global grid is baked, which lights what has no lightmap. auto: where the level says "
+                    "that something moves (a node with dimmer_dynamic, a mesh whose dimmer_lighting is dynamic or "
+                    "local_grid, a dimmer_play_area); on: always; off: never"});
     list.push_back({"grids.probes_max", &p.probes_max, 0, 1 << 20,
                     "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. One per cubic "
                     "metre of open space is never exceeded"});

@@ -14,7 +14,7 @@ namespace dimmer::cook {
 
 struct Setting {
     std::string key;  // dotted: "lightmaps.page_size"
-    std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*> target;
+    std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*, GridMode*> target;
     double least = 0, most = 0;  // of a number
     std::string what;            // with its unit, and why one would change it
 };

@@ -7,7 +7,7 @@ namespace {
 
 // What is traced at a probe itself counts as much as this share of its sites.
 constexpr float prior_share = 0.05f;
-constexpr int steps = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
+constexpr int steps_max = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
 
 using Vector = std::vector<FitValue>;
 
@@ -23,7 +23,7 @@ class Solver {
         }
     }
 
-    void solve(std::span<const FitValue> targets, std::span<FitValue> x) const {
+    void solve(std::span<const FitValue> targets, float tolerance, std::span<FitValue> x) const {
         const size_t n = x.size();
         Vector residual(n, FitValue{}), image(n), direction(n);
         for (size_t s = 0; s < sites_.size(); ++s) {
@@ -37,7 +37,13 @@ class Solver {
                 direction[i][c] = residual[i][c] / diagonal_[i];
                 power[c] += residual[i][c] * direction[i][c];
             }
-        for (int step = 0; step < steps; ++step) {
+        const FitValue enough = powerOfTargets(targets, n, tolerance);
+        const auto done = [&] {
+            for (size_t c = 0; c < 27; ++c)
+                if (power[c] > enough[c]) return false;
+            return true;
+        };
+        for (int step = 0; step < steps_max && !done(); ++step) {
             apply(direction, image);
             FitValue curvature{}, next{};
             for (size_t i = 0; i < n; ++i)
@@ -60,6 +66,16 @@ class Solver {
     }
 
    private:
+    // Below which a residual's power is at most `tolerance`, squared, of that of all light.
+    FitValue powerOfTargets(std::span<const FitValue> targets, size_t n, float tolerance) const {
+        Vector image(n, FitValue{});
+        for (size_t s = 0; s < sites_.size(); ++s) scatter(targets[s], sites_[s], image);
+        FitValue power{};
+        for (size_t i = 0; i < n; ++i)
+            for (size_t c = 0; c < 27; ++c) power[c] += image[i][c] * image[i][c] / diagonal_[i];
+        for (float& p : power) p *= tolerance * tolerance;
+        return power;
+    }
     static void accumulate(FitValue& sum, const FitSite& s, std::span<const FitValue> x, float sign) {
         for (size_t k = 0; k < 4; ++k)
             for (size_t c = 0; c < 27; ++c) sum[c] += sign * s.shares[k] * x[s.probes[k]][c];
@@ -84,8 +100,9 @@ class Solver {
 
 }  // namespace
 
-void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes) {
-    Solver(sites, probes.size()).solve(targets, probes);
+void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes,
+               float tolerance) {
+    Solver(sites, probes.size()).solve(targets, tolerance, probes);
 }
 
 }  // namespace dimmer::cook

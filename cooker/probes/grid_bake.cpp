@@ -1,7 +1,5 @@
 #include <probes/grid_bake.h>
 
-#include <bake/final_gather.h>
-#include <bake/sampling.h>
 #include <probes/placement.h>
 #include <probes/tetrahedra.h>
 
@@ -10,97 +8,37 @@
 namespace dimmer::cook {
 namespace {
 
-// Rays go all around, and there are few probes: more of them than a texel gets.
-constexpr uint32_t rays_per_texel_ray = 4;
-constexpr uint32_t probe_seed = 0x9b05688cu;
-
-class GridGather {
-   public:
-    GridGather(const Sites& sites, const Series& series, const BakeSettings& settings)
-        : sites_(sites),
-          gatherer_(sites.gatherer()),
-          series_(series),
-          settings_(settings),
-          floors_(noiseFloors(series)),
-          options_(finalGatherOptions(settings, floors_)),
-          final_(gatherer_),
-          sum_(gatherer_.paths().termCount()),
-          direct_(gatherer_.paths().termCount()),
-          stored_(gatherer_.paths().termCount()) {
-        options_.rays_max *= rays_per_texel_ray;
-    }
-
-    // `wanted`: terms to gather besides those that are active at the probe itself, ascending.
-    uint64_t gather(glm::vec3 position_m, uint32_t number, std::span<const uint32_t> wanted,
-                    std::vector<ProbeTermLight>& row) {
-        const SamplePoint point{position_m, no_face};
-        const GatherFrom from = Gatherer::atProbe(point, probe_seed + number);
-        findActive(from, wanted);
-        row.clear();
-        const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row);
-        for (ProbeTermLight& l : row)
-            if (const auto touched = stored_.touched(); std::ranges::binary_search(touched, l.term))
-                l.light += stored_[l.term];
-        stored_.clear();
-        return traced + settings_.series_rays;
-    }
-
-   private:
-    // As for texels: lit straight, or by as much as the term's threshold asks.
-    void findActive(const GatherFrom& from, std::span<const uint32_t> wanted) {
-        sites_.directAt(from, direct_, stored_);
-        gatherer_.gather(from,
-                         {.rays = settings_.series_rays,
-                          .emitter_samples = settings_.emitter_samples,
-                          .seed = settings_.seed,
-                          .wanted_in_group = {}},
-                         &series_.radiance, sum_, nullptr);
-        active_.assign(wanted.begin(), wanted.end());
-        active_.push_back(always_group);
-        for (auto* light : {&direct_, &sum_}) {
-            for (const uint32_t t : light->touched()) {
-                const float lux = luminance((*light)[t].irradiance());
-                if (t != always_group && series_.active(t, 0, lux)) active_.push_back(t);
-            }
-            light->clear();
-        }
-        std::ranges::sort(active_);
-        active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
-    }
-
-    const Sites& sites_;
-    const Gatherer& gatherer_;
-    const Series& series_;
-    const BakeSettings& settings_;
-    std::vector<float> floors_;
-    FinalGatherOptions options_;
-    FinalGather<ProbeLight> final_;
-    TermAccumulator<ProbeLight> sum_, direct_, stored_;
-    std::vector<uint32_t> active_;
-};
-
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
 
-// Per position, ascending.
-std::vector<std::vector<uint32_t>> termsAround(const Placement& placed) {
-    std::vector<std::vector<uint32_t>> terms(placed.sources.size());
+// Per position that is not another's double, ascending: the terms of its own place and of the places that it counts at;
+// with the light that was traced at its own.
+std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed, const Sparse<ProbeTermLight>& light) {
+    const size_t probes = placed.sources.size();
+    std::vector<std::vector<uint32_t>> around(probes);
     for (size_t s = 0; s < placed.sites.size(); ++s)
         for (size_t k = 0; k < 4; ++k)
             if (placed.sites[s].shares[k] >= share_that_counts)
-                for (const ProbeTermLight& l : placed.light[s].terms)
-                    terms[placed.sites[s].probes[k]].push_back(l.term);
-    for (auto& list : terms) {
-        std::ranges::sort(list);
-        list.erase(std::unique(list.begin(), list.end()), list.end());
-    }
-    return terms;
+                for (const ProbeTermLight& l : light.row(s)) around[placed.sites[s].probes[k]].push_back(l.term);
+    std::vector<std::vector<ProbeTermLight>> rows(probes);
+    tbb::parallel_for(size_t{0}, probes, [&](size_t i) {
+        if (placed.sources[i] != i) return;
+        const auto own = light.row(placed.place_of[i]);
+        rows[i].assign(own.begin(), own.end());
+        std::ranges::sort(around[i]);
+        around[i].erase(std::unique(around[i].begin(), around[i].end()), around[i].end());
+        for (const uint32_t term : around[i])
+            if (std::ranges::find(own, term, &ProbeTermLight::term) == own.end()) rows[i].push_back({term, {}, 0, 0});
+        std::ranges::sort(rows[i], {}, &ProbeTermLight::term);
+    });
+    return rows;
 }
 
 // One term over the probes that have it and the sites where they count.
 class TermFit {
    public:
-    explicit TermFit(const Placement& placed) : placed_(placed), number_(placed.sources.size(), no_probe) {}
+    TermFit(const Placement& placed, const Sparse<ProbeTermLight>& light)
+        : placed_(placed), light_(light), number_(placed.sources.size(), no_probe) {}
 
     void fit(uint32_t term, std::vector<std::vector<ProbeTermLight>>& rows) {
         std::vector<ProbeTermLight*> members;
@@ -138,7 +76,7 @@ class TermFit {
                 known += site.shares[k];
             }
             if (!(known > 0)) continue;
-            const auto& terms = placed_.light[s].terms;
+            const auto terms = light_.row(s);
             const auto found = std::ranges::find(terms, term, &ProbeTermLight::term);
             targets_.push_back(found == terms.end() ? FitValue{} : valueOf(found->light));
             sites_.push_back(site);
@@ -160,43 +98,35 @@ class TermFit {
     }
 
     const Placement& placed_;
-    std::vector<uint32_t> number_;  // per position, among the probes of the term
+    const Sparse<ProbeTermLight>& light_;  // per site
+    std::vector<uint32_t> number_;         // per position, among the probes of the term
     std::vector<FitSite> sites_;
     std::vector<FitValue> targets_;
 };
 
 }  // namespace
 
-Expected<void> bakeGrid(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                        Progress& progress, Baked& out) {
-    if (settings.grid.probes_max == 0) return {};
-    const Sites sites(gatherer, series, settings);
-    auto placed = placeProbes(sites, settings.grid, progress);
+Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, const Sparse<ProbeTermLight>& light,
+                             std::span<const Term> terms, const GridSettings& settings, Progress& progress) {
+    BakedGrid out;
+    out.free_volume_m3 = choice.free_volume_m3;
+    if (choice.blocks.empty()) return out;
+    const std::vector<FitValue> states = statesOf(light, terms, choice.blocks[0].places_m.size());
+    auto placed = placeProbes(rays, choice, states, settings, progress);
     if (!placed) return std::unexpected(placed.error());
-    const size_t probes = placed->grid.positions.size();
-    progress.stage("probes", probes);
-    const auto around = termsAround(*placed);
-    std::atomic<uint64_t> rays = 0;
+    progress.stage("probes", terms.size());
     // Blocks of rows are large for so few receivers, so each row is made on its own.
-    std::vector<std::vector<ProbeTermLight>> rows(probes);
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, probes, 16), [&](const auto& range) {
-        GridGather gather(sites, series, settings);
-        uint64_t traced = 0;
-        for (size_t i = range.begin(); i < range.end(); ++i)
-            if (placed->sources[i] == i)
-                traced += gather.gather(vec(placed->grid.positions[i]), static_cast<uint32_t>(i), around[i], rows[i]);
-        rays += traced;
-        progress.advance(range.size());
-    });
-    if (settings.grid.fit)
-        tbb::parallel_for(0u, gatherer.paths().termCount(), [&](uint32_t t) { TermFit(*placed).fit(t, rows); });
-    out.grid.light = Sparse<ProbeTermLight>::build(probes, [&](size_t begin, size_t end, auto emit) {
+    auto rows = tracedAtProbes(*placed, light);
+    if (settings.fit)
+        tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) {
+            TermFit(*placed, light).fit(static_cast<uint32_t>(t), rows);
+            progress.advance(1);
+        });
+    out.light = Sparse<ProbeTermLight>::build(placed->sources.size(), [&](size_t begin, size_t end, auto emit) {
         for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[placed->sources[i]]));
     });
-    out.grid.grid = std::move(placed->grid);
-    out.grid.free_volume_m3 = placed->free_volume_m3;
-    out.rays += rays + sites.raysTraced();
-    return {};
+    out.grid = std::move(placed->grid);
+    return out;
 }
 
 }  // namespace dimmer::cook

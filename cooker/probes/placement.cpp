@@ -20,35 +20,39 @@
 namespace dimmer::cook {
 namespace {
 
-// On average over the free space: the grid need not be denser to be as right as lightmaps are.
-constexpr double density_max_per_m3 = 1;
-// Small levels can have more, and need it, as single probes matter.
-constexpr double small_sites_per_probe = 40, small_sites = 4000;
-constexpr uint32_t sites_max = 60000;
-constexpr uint32_t first_look = 2000;  // sites that tell how much of the level is free
 constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
 constexpr double growth = 0.1;         // of the number of probes in a round, at most
 constexpr uint32_t grow_rounds_max = 64;
 // The more sites there are to a probe, the more rounds of exchange find better ones among them.
-constexpr size_t sites_per_exchange = 2, exchange_rounds_max = 16;
+constexpr size_t sites_per_exchange = 3, exchange_rounds_max = 16;
 constexpr size_t exchange_part = 5;        // one in so many is exchanged
 constexpr float importance_floor = 0.05f;  // of the mean light: darker sites count no more
-constexpr float floor_of_mean = 0.01f;     // as the error measures have it
+// Of the mean light: errors of what is darker are as small as it. Every group counts alike here, so that faint ones ask
+// for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000; at 0.2 light leaks
+// through walls (1.7 % instead of 0.7 % in GridBake.LightStaysInItsRoom).
+constexpr float floor_of_mean = 0.03f;
+constexpr float search_tolerance = 0.01f;  // of fits on the way: errors that count are larger
 
 class Placer {
    public:
-    Placer(const Sites& sites, const GridSettings& settings, Progress& progress)
-        : sites_(sites),
-          settings_(settings),
+    Placer(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
+           const GridSettings& settings, Progress& progress)
+        : settings_(settings),
           progress_(progress),
-          rays_(sites.gatherer().rays()),
-          near_(coarse_spacing_m) {}
+          rays_(rays),
+          states_(states),
+          limit_(choice.probes_max),
+          free_volume_m3_(choice.free_volume_m3),
+          places_(choice.places()),
+          first_corner_(places_.size() - choice.blocks.back().places_m.size()),
+          near_(coarse_spacing_m) {
+        auto corner = static_cast<uint32_t>(first_corner_);
+        for (const bool is_free : choice.corner_free) corners_.push_back(is_free ? corner++ : no_index);
+        is_probe_.assign(first_corner_, false);
+    }
 
     Expected<Placement> run() {
-        if (auto ok = chooseSites(); !ok) return std::unexpected(ok.error());
-        if (places_.empty()) return std::move(out_);
-        out_.light = sites_.trace(places_, progress_);
         decideImportance();
         settings_.uniform ? placeLattice() : placeCoarse();
         if (auto ok = build(); !ok) return std::unexpected(ok.error());
@@ -57,9 +61,12 @@ class Placer {
             if (auto ok = grow(); !ok) return std::unexpected(ok.error());
             if (auto ok = exchange(); !ok) return std::unexpected(ok.error());
         }
+        look_ = Look::Thorough;
+        seen_.clear();
+        if (auto ok = build(); !ok) return std::unexpected(ok.error());
         // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
         out_.sites.resize(first_corner_);
-        out_.light.resize(first_corner_);
+        for (uint32_t i = 0; i < out_.grid.positions.size(); ++i) out_.place_of.push_back(siteOf(i));
         return std::move(out_);
     }
 
@@ -90,7 +97,7 @@ class Placer {
             best = {probes_, levels_};
         }
         std::tie(probes_, levels_) = best;
-        return build();
+        return {};
     }
 
     size_t exchangeRounds() const { return std::min(exchange_rounds_max, first_corner_ / limit_ / sites_per_exchange); }
@@ -112,7 +119,7 @@ class Placer {
             const float near = 1 / glm::dot(p - q, p - q);
             for (const auto& [to, from] : {std::pair(a, b), std::pair(b, a)}) {
                 weight[to] += near;
-                for (size_t c = 0; c < 27; ++c) around[to][c] += near * out_.light[probes_[from]].states[c];
+                for (size_t c = 0; c < 27; ++c) around[to][c] += near * states_[probes_[from]][c];
             }
         }
         for (const FitSite& s : out_.sites)
@@ -120,7 +127,7 @@ class Placer {
                 if (s.probes[k] < count) shares[s.probes[k]] += s.shares[k];
         for (size_t i = 0; i < count; ++i) {
             for (float& v : around[i]) v /= std::max(weight[i], 1e-12f);
-            useful[i] = shares[i] * errorOf(around[i], out_.light[probes_[i]].states);
+            useful[i] = shares[i] * errorOf(around[i], states_[probes_[i]]);
         }
         return useful;
     }
@@ -156,42 +163,17 @@ class Placer {
         }
     }
 
-    // Free places, and behind them the corners of the box.
-    Expected<void> chooseSites() {
-        double share = 0;
-        sites_.choose(first_look, share);
-        const glm::dvec3 size = glm::dvec3(rays_.boundsMax()) - glm::dvec3(rays_.boundsMin());
-        out_.free_volume_m3 = share * size.x * size.y * size.z;
-        const auto most = static_cast<double>(settings_.probes_max);
-        // The box's corners are probes too.
-        limit_ = static_cast<size_t>(std::clamp(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0, most));
-        const auto probes = static_cast<double>(limit_);
-        const double wanted = std::max(settings_.sites * probes, std::min(small_sites_per_probe * probes, small_sites));
-        const auto count = static_cast<uint32_t>(std::min(wanted, static_cast<double>(sites_max)));
-        places_ = sites_.choose(count, share);
-        if (places_.empty()) return {};
-        first_corner_ = places_.size();
-        const auto box = tetrahedralise({}, {rays_.boundsMin(), rays_.boundsMax()});
-        if (!box) return std::unexpected(box.error());
-        for (const ProbePosition& corner : box->positions) {
-            places_.push_back(vec(corner));
-            corner_free_.push_back(inTheOpen(rays_, places_.back()));
-        }
-        is_probe_.assign(first_corner_, false);
-        return {};
-    }
-
     // Between absolute errors and shares of the light that is there: least squares of shares would have lamps' light
     // too dark, as too bright costs more.
     void decideImportance() {
         // From the first coefficient to the mean irradiance: sqrt(pi) / 2.
         const float to_lux = std::sqrt(pi) / 2;
         double sum = 0;
-        for (size_t i = 0; i < first_corner_; ++i) sum += static_cast<double>(to_lux * out_.light[i].states[0]);
+        for (size_t i = 0; i < first_corner_; ++i) sum += static_cast<double>(to_lux * states_[i][0]);
         const auto mean = static_cast<float>(sum / static_cast<double>(first_corner_));
         floor_lux_ = std::max(mean * floor_of_mean, 1e-12f);
-        for (const SiteLight& l : out_.light) {
-            const float lux = to_lux * l.states[0] + importance_floor * mean + 1e-12f;
+        for (const FitValue& state : states_) {
+            const float lux = to_lux * state[0] + importance_floor * mean + 1e-12f;
             importance_.push_back(1 / lux);
         }
     }
@@ -218,7 +200,7 @@ class Placer {
 
     // The sites nearest to the points of a lattice, as many points as probes may be: as even as sites are.
     void placeLattice() {
-        double spacing_m = std::cbrt(out_.free_volume_m3 / static_cast<double>(limit_));
+        double spacing_m = std::cbrt(free_volume_m3_ / static_cast<double>(limit_));
         std::vector<uint32_t> chosen = latticeSites(spacing_m);
         for (; chosen.size() > limit_; chosen = latticeSites(spacing_m)) spacing_m *= 1.02;
         for (const uint32_t site : chosen) add(site, 0);
@@ -251,14 +233,11 @@ class Placer {
         return {};
     }
 
-    // The site that a position is.
+    // The site that a position is; no_index: a corner that is not free.
     uint32_t siteOf(uint32_t position) const {
-        return position < probes_.size() ? probes_[position]
-                                         : static_cast<uint32_t>(first_corner_ + position - probes_.size());
+        return position < probes_.size() ? probes_[position] : corners_[position - probes_.size()];
     }
-    bool isFree(uint32_t position) const {
-        return position < probes_.size() || corner_free_[position - probes_.size()];
-    }
+    bool isFree(uint32_t position) const { return siteOf(position) != no_index; }
 
     void findSources() {
         const auto count = static_cast<uint32_t>(out_.grid.positions.size());
@@ -267,8 +246,9 @@ class Placer {
             out_.sources[i] = i;
             float nearest = std::numeric_limits<float>::infinity();
             for (uint32_t k = 0; k < count && !isFree(i); ++k) {
-                const float distance = glm::distance(places_[siteOf(i)], places_[siteOf(k)]);
-                if (isFree(k) && distance < nearest) nearest = distance, out_.sources[i] = k;
+                if (!isFree(k)) continue;
+                const float distance = glm::distance(vec(out_.grid.positions[i]), places_[siteOf(k)]);
+                if (distance < nearest) nearest = distance, out_.sources[i] = k;
             }
         }
     }
@@ -288,10 +268,14 @@ class Placer {
         });
     }
 
-    // Tetrahedra of earlier rounds keep what was found: by the sites that their probes are.
+    // Tetrahedra of earlier rounds keep what was found: by the sites that their probes are, and the corners.
     using Key = std::array<uint32_t, 4>;
     Key keyOf(const Tetrahedron& t) const {
-        return {siteOf(t.probes[0]), siteOf(t.probes[1]), siteOf(t.probes[2]), siteOf(t.probes[3])};
+        const auto name = [&](uint32_t position) {
+            return position < probes_.size() ? probes_[position]
+                                             : static_cast<uint32_t>(places_.size() + position - probes_.size());
+        };
+        return {name(t.probes[0]), name(t.probes[1]), name(t.probes[2]), name(t.probes[3])};
     }
 
     void findVisibility() {
@@ -313,7 +297,7 @@ class Placer {
                 corners[k] = vec(grid.positions[t.probes[k]]);
                 free[k] = isFree(t.probes[k]);
             }
-            grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free);
+            grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, look_);
         });
         for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
     }
@@ -327,17 +311,16 @@ class Placer {
 
     // With the light that probes would be given.
     void findErrors() {
-        std::vector<FitValue> targets, probes;
-        for (const SiteLight& l : out_.light) targets.push_back(l.states);
-        for (uint32_t i = 0; i < out_.grid.positions.size(); ++i) probes.push_back(targets[siteOf(i)]);
-        fitProbes(std::span(out_.sites).first(first_corner_), targets, probes);
+        std::vector<FitValue> probes;
+        for (uint32_t i = 0; i < out_.grid.positions.size(); ++i) probes.push_back(states_[siteOf(out_.sources[i])]);
+        fitProbes(std::span(out_.sites).first(first_corner_), states_.first(first_corner_), probes, search_tolerance);
         error_.resize(first_corner_);
         tbb::parallel_for(size_t{0}, first_corner_, [&](size_t i) {
             const FitSite& site = out_.sites[i];
             FitValue light{};
             for (size_t k = 0; k < 4; ++k)
                 for (size_t c = 0; c < light.size(); ++c) light[c] += site.shares[k] * probes[site.probes[k]][c];
-            error_[i] = is_probe_[i] ? 0 : errorOf(light, targets[i]);
+            error_[i] = is_probe_[i] ? 0 : errorOf(light, states_[i]);
         });
     }
 
@@ -370,22 +353,24 @@ class Placer {
         return probes_.size() > before;
     }
 
-    const Sites& sites_;
     const GridSettings& settings_;
     Progress& progress_;
     const RayScene& rays_;
+    std::span<const FitValue> states_;  // per place
+    size_t limit_;                      // of probes
+    double free_volume_m3_;
+    std::vector<glm::vec3> places_;  // sites, and behind them the free corners of the box
+    size_t first_corner_;
+    std::vector<uint32_t> corners_;  // per corner: its place, or no_index
     Placement out_;
-    size_t limit_ = 0;  // of probes
     float floor_lux_ = 0;
     uint32_t level_ = 0;
-    std::vector<glm::vec3> places_;  // sites, the last 8 corners of the box
-    size_t first_corner_ = 0;
-    std::vector<bool> corner_free_;
     std::vector<float> importance_;  // per site
     std::vector<bool> is_probe_;     // per site but corners
     std::vector<uint32_t> probes_;   // sites
     std::vector<uint8_t> levels_;    // of probes_
     Neighbourhood near_;
+    Look look_ = Look::Hasty;
     std::map<Key, TetrahedronVisibility> seen_;
     std::vector<uint32_t> place_;  // per site: its tetrahedron
     std::vector<float> error_;     // per site but corners
@@ -393,8 +378,9 @@ class Placer {
 
 }  // namespace
 
-Expected<Placement> placeProbes(const Sites& sites, const GridSettings& settings, Progress& progress) {
-    return Placer(sites, settings, progress).run();
+Expected<Placement> placeProbes(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
+                                const GridSettings& settings, Progress& progress) {
+    return Placer(rays, choice, states, settings, progress).run();
 }
 
 }  // namespace dimmer::cook

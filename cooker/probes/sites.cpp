@@ -4,114 +4,336 @@
 #include <bake/final_gather.h>
 #include <bake/sampling.h>
 #include <probes/free_space.h>
+#include <probes/tetrahedra.h>
 
 #include <algorithm>
+#include <bit>
+#include <map>
 
 namespace dimmer::cook {
 namespace {
 
+// On average over the free space: the grid need not be denser to be as right as lightmaps are.
+constexpr double density_max_per_m3 = 1;
+// Small levels can have more sites, and need them, as single probes matter.
+constexpr double small_sites_per_probe = 40, small_sites = 4000;
+constexpr double sites_max = 60000;
+constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
 constexpr uint32_t tries_per_site = 16;
-// One place in so many is tried near a lamp, where light changes over a hand's breadth.
-constexpr uint32_t lamp_period = 2;
+// Half of the places are near a lamp, where light changes over a hand's breadth.
+constexpr double share_near_lamps = 0.5;
 constexpr float lamp_reach_m = 0.8f;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
-constexpr size_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
+constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
 constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
+// Of a light set, beside always-on light: sets are off at times.
+constexpr float weight_of_sets = 0.05f;
 
-// Doors are closed. Neighbouring light sets fall on both sides of a wall as well as not, so that light which leaks
-// through it is seen as an error in one of the halves.
-bool counts(const Term& term, size_t state) {
-    return term.doors_open.empty() && (state == 0 || term.group % 2 == state - 1);
+class Chooser {
+   public:
+    Chooser(const RayScene& rays, const GridSettings& settings) : rays_(rays), settings_(settings) {
+        for (const PunctualLight& light : rays.scene().lights)
+            if (light.type != LightType::Directional && light.bake != BakeMode::None &&
+                std::ranges::find(lamps_, light.position_m) == lamps_.end())
+                lamps_.push_back(light.position_m);
+    }
+
+    Expected<SiteChoice> run() {
+        const uint32_t wanted = decideCounts();
+        const uint32_t rays = std::clamp(small_level_rays / std::max(wanted, 1u), site_rays_min, site_rays_max);
+        const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
+        out_.blocks.push_back({open(wanted - at_lamps, [&](uint32_t i) { return anywhere(i); }), rays});
+        const auto lamps = static_cast<uint32_t>(lamps_.size());
+        for (const glm::vec3 lamp : lamps_)
+            if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
+                out_.blocks.push_back({open(count, [&](uint32_t i) { return nearLamp(lamp, i); }), rays});
+        if (out_.places().empty()) {
+            out_.blocks.clear();
+            return std::move(out_);
+        }
+        auto corners = freeCorners();
+        if (!corners) return std::unexpected(corners.error());
+        out_.blocks.push_back({std::move(*corners), rays});
+        return std::move(out_);
+    }
+
+   private:
+    // Of sites wanted.
+    uint32_t decideCounts() {
+        const auto is_free = test(0, first_look, [&](uint32_t i) { return anywhere(i); });
+        const glm::dvec3 size = glm::dvec3(rays_.boundsMax()) - glm::dvec3(rays_.boundsMin());
+        out_.free_volume_m3 =
+            static_cast<double>(std::ranges::count(is_free, 1)) / first_look * size.x * size.y * size.z;
+        const auto most = static_cast<double>(settings_.probes_max);
+        // The box's corners are probes too.
+        const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0), most));
+        out_.probes_max = static_cast<size_t>(probes);
+        const double wanted = std::max(settings_.sites * probes, std::min(small_sites_per_probe * probes, small_sites));
+        return static_cast<uint32_t>(std::min(wanted, sites_max));
+    }
+
+    glm::vec3 anywhere(uint32_t i) const {
+        const glm::vec3 low = rays_.boundsMin(), size = rays_.boundsMax() - low;
+        return low + size * glm::vec3(radicalInverse(2, i + 1), radicalInverse(3, i + 1), radicalInverse(5, i + 1));
+    }
+    // Uniform in the distance, so that each shell around a lamp gets as many: light there falls with its square.
+    static glm::vec3 nearLamp(glm::vec3 lamp_m, uint32_t i) {
+        const glm::vec3 u = sequence3d(i, site_seed);
+        return lamp_m + lamp_reach_m * u.z * uniformSphereDirection({u.x, u.y});
+    }
+
+    std::vector<uint8_t> test(uint32_t begin, uint32_t count, auto&& at) const {
+        std::vector<uint8_t> is_free(count);
+        tbb::parallel_for(0u, count, [&](uint32_t i) { is_free[i] = inTheOpen(rays_, at(begin + i)); });
+        return is_free;
+    }
+
+    // The first `count` that are in the open of at most 16 times as many.
+    std::vector<glm::vec3> open(uint32_t count, auto&& at) const {
+        std::vector<glm::vec3> places;
+        const uint32_t tries = tries_per_site * count;
+        for (uint32_t tried = 0; places.size() < count && tried < tries;) {
+            const uint32_t block = std::min(std::clamp(count, 64u, 4096u), tries - tried);
+            const auto is_free = test(tried, block, at);
+            for (uint32_t i = 0; i < block; ++i)
+                if (is_free[i] && places.size() < count) places.push_back(at(tried + i));
+            tried += block;
+        }
+        return places;
+    }
+
+    Expected<std::vector<glm::vec3>> freeCorners() {
+        const auto box = tetrahedralise({}, {rays_.boundsMin(), rays_.boundsMax()});
+        if (!box) return std::unexpected(box.error());
+        std::vector<glm::vec3> corners;
+        for (const ProbePosition& p : box->positions) {
+            const glm::vec3 corner(p.x_m, p.y_m, p.z_m);
+            out_.corner_free.push_back(inTheOpen(rays_, corner));
+            if (out_.corner_free.back()) corners.push_back(corner);
+        }
+        return corners;
+    }
+
+    const RayScene& rays_;
+    const GridSettings& settings_;
+    std::vector<glm::vec3> lamps_;
+    SiteChoice out_;
+};
+
+// Light at places, of some groups. One worker's scratch.
+class PlaceTrace {
+   public:
+    PlaceTrace(const Gatherer& gatherer, const LightGrid& lights, const SparseLight& radiance,
+               std::span<const TermReport> reports, const BakeSettings& settings, std::span<const uint8_t> groups)
+        : gatherer_(gatherer),
+          lights_(lights),
+          radiance_(radiance),
+          reports_(reports),
+          settings_(settings),
+          sum_(gatherer.paths().termCount()),
+          direct_(gatherer.paths().termCount()),
+          wanted_in_group_(gatherer.paths().groupCount()) {
+        for (uint32_t t = 0; t < gatherer.paths().termCount(); ++t) {
+            const uint32_t group = gatherer.paths().terms()[t].group;
+            sum_.setWanted(t, groups[group] != 0);
+            wanted_in_group_[group] += groups[group];
+        }
+    }
+
+    // Adds what is active there, ascending. Returns the rays traced.
+    uint64_t trace(glm::vec3 place, uint32_t rays, std::vector<ProbeTermLight>& row) {
+        const SamplePoint point{place, no_face};
+        // A place has noise of its own wherever it stands in whatever list.
+        uint32_t seed = site_seed;
+        for (int c = 0; c < 3; ++c) seed = hash(seed, std::bit_cast<uint32_t>(place[c]));
+        const GatherFrom from = Gatherer::atProbe(point, seed);
+        const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, sum_);
+        gatherer_.gather(from,
+                         {.rays = rays,
+                          .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
+                          .seed = settings_.seed + 2,
+                          .wanted_in_group = wanted_in_group_},
+                         &radiance_, sum_, nullptr);
+        if (sum_.wants(always_group)) sum_[always_group];  // every site has some
+        for (const uint32_t t : direct_.touched())
+            if (sum_.wants(t)) sum_[t];
+        for (const uint32_t t : sum_.touched()) {
+            if (!sum_.wants(t)) continue;
+            const ProbeLight& light = sum_[t];
+            if (isActive(reports_[t], t, luminance(direct_[t].irradiance()), luminance(light.irradiance())))
+                row.push_back({t, light, 0, 0});
+        }
+        sum_.clear();
+        direct_.clear();
+        return shadow_rays + rays;
+    }
+
+   private:
+    const Gatherer& gatherer_;
+    const LightGrid& lights_;
+    const SparseLight& radiance_;
+    std::span<const TermReport> reports_;
+    const BakeSettings& settings_;
+    TermAccumulator<ProbeLight> sum_, direct_;
+    std::vector<uint32_t> wanted_in_group_;
+};
+
+// Per term, its number among those of its group.
+std::vector<uint32_t> numbersInGroups(const DoorPaths& paths) {
+    std::vector<uint32_t> counts(paths.groupCount()), number;
+    for (const Term& term : paths.terms()) number.push_back(counts[term.group]++);
+    return number;
+}
+
+std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
+    std::vector<double> sums, counts;
+    for (size_t i = 0; i < light.rows(); ++i) {
+        if (i == even && std::ranges::any_of(sums, [](double sum) { return sum > 0; })) break;
+        for (const ProbeTermLight& l : light.row(i)) {
+            const Term& term = terms[l.term];
+            if (!term.free()) continue;
+            sums.resize(std::max<size_t>(sums.size(), term.group + 1));
+            counts.resize(sums.size());
+            const auto lux = static_cast<double>(luminance(l.light.irradiance()));
+            sums[term.group] += lux;
+            counts[term.group] += lux > 0;
+        }
+    }
+    std::vector<float> weights(1 + std::ranges::max(terms, {}, &Term::group).group);
+    for (size_t g = 0; g < sums.size(); ++g)
+        if (sums[g] > 0)
+            weights[g] = static_cast<float>(counts[g] / sums[g]) * (g == always_group ? 1 : weight_of_sets);
+    return weights;
 }
 
 }  // namespace
 
-Sites::Sites(const Gatherer& gatherer, const Series& series, const BakeSettings& settings)
-    : gatherer_(gatherer), series_(series), settings_(settings), lights_(gatherer.rays(), settings.light_grid) {
-    for (const PunctualLight& light : gatherer.rays().scene().lights)
-        if (light.type != LightType::Directional && light.bake != BakeMode::None) lamps_.push_back(light.position_m);
+std::vector<glm::vec3> SiteChoice::places() const {
+    std::vector<glm::vec3> all;
+    for (const SiteBlock& block : blocks) all.insert(all.end(), block.places_m.begin(), block.places_m.end());
+    return all;
 }
 
-// Uniform in the distance, so that each shell around a lamp gets as many: light there falls with its square.
-glm::vec3 Sites::nearLamp(uint32_t index) const {
-    const glm::vec3 u = sequence3d(index, site_seed);
-    return lamps_[index % lamps_.size()] + lamp_reach_m * u.z * uniformSphereDirection({u.x, u.y});
+Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings) {
+    return Chooser(rays, settings).run();
 }
 
-std::vector<glm::vec3> Sites::choose(uint32_t count, double& free_share) const {
-    const glm::vec3 low = gatherer_.rays().boundsMin(), size = gatherer_.rays().boundsMax() - low;
-    std::vector<glm::vec3> sites;
-    uint32_t tried = 0, found = 0, anywhere = 0;
-    constexpr uint32_t block = 4096;
-    std::vector<uint8_t> is_free(block);
-    const auto isNearLamp = [&](uint32_t i) { return !lamps_.empty() && (tried + i) % lamp_period == 0; };
-    while (sites.size() < count && tried < tries_per_site * count) {
-        const auto at = [&](uint32_t i) {
-            // Each kind numbers its own tries: every third point of a Halton sequence would leave gaps.
-            const uint32_t lamp_index = (tried + i) / lamp_period;
-            if (isNearLamp(i)) return nearLamp(lamp_index);
-            const uint32_t index = lamps_.empty() ? tried + i + 1 : tried + i - lamp_index;
-            return low + size * glm::vec3(radicalInverse(2, index), radicalInverse(3, index), radicalInverse(5, index));
-        };
-        tbb::parallel_for(0u, block, [&](uint32_t i) { is_free[i] = inTheOpen(gatherer_.rays(), at(i)); });
-        for (uint32_t i = 0; i < block; ++i) {
-            found += is_free[i] && !isNearLamp(i);
-            anywhere += !isNearLamp(i);
-            if (is_free[i] && sites.size() < count) sites.push_back(at(i));
+SiteLight::SiteLight(std::span<const SiteBlock> blocks, uint32_t groups, GroupStore* store)
+    : blocks_(blocks), store_(store), light_(groups, std::vector<SiteBlockLight>(blocks.size())) {
+    for (uint32_t g = 0; store && g < groups; ++g)
+        for (SiteBlockLight& known : store->findSites(g, blocks))
+            if (const auto block = std::ranges::find(blocks, known.block); block != blocks.end())
+                light_[g][static_cast<size_t>(block - blocks.begin())] = std::move(known);
+}
+
+std::vector<uint8_t> SiteLight::asked() const {
+    std::vector<uint8_t> groups(light_.size());
+    for (uint32_t g = 0; g < light_.size(); ++g)
+        for (size_t b = 0; b < blocks_.size(); ++b)
+            if (!blocks_[b].places_m.empty() && isMissing(g, b)) groups[g] = 1;
+    return groups;
+}
+
+// Groups, ascending.
+std::vector<uint32_t> SiteLight::missingAt(size_t block) const {
+    std::vector<uint32_t> groups;
+    for (uint32_t g = 0; g < light_.size(); ++g)
+        if (isMissing(g, block)) groups.push_back(g);
+    return groups;
+}
+
+// Of one block and group, from what was traced at the block's places.
+Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t group, const DoorPaths& paths,
+                                          std::span<const uint32_t> number) {
+    return Sparse<ProbeTermLight>::build(rows.size(), [&](size_t begin, size_t end, auto emit) {
+        Row row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            for (const ProbeTermLight& l : rows[i])
+                if (paths.terms()[l.term].group == group) row.push_back({number[l.term], l.light, 0, 0});
+            emit(std::span<const ProbeTermLight>(row));
         }
-        tried += block;
-    }
-    free_share = static_cast<double>(found) / std::max(anywhere, 1u);
-    return sites;
-}
-
-void Sites::directAt(const GatherFrom& from, TermAccumulator<ProbeLight>& reflected,
-                     TermAccumulator<ProbeLight>& stored) const {
-    rays_traced_ += directLight(gatherer_, lights_, from, reflected, stored);
-}
-
-std::vector<SiteLight> Sites::trace(std::span<const glm::vec3> places, Progress& progress) const {
-    progress.stage("light at probe sites", places.size());
-    std::vector<SiteLight> out(places.size());
-    const auto rays = static_cast<uint32_t>(
-        std::clamp(small_level_rays / std::max<size_t>(places.size(), 1), site_rays_min, site_rays_max));
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
-        TermAccumulator<ProbeLight> sum(gatherer_.paths().termCount()), direct(gatherer_.paths().termCount());
-        for (size_t i = range.begin(); i < range.end(); ++i) {
-            const SamplePoint point{places[i], no_face};
-            const GatherFrom from = Gatherer::atProbe(point, site_seed + static_cast<uint32_t>(i));
-            directAt(from, direct, sum);
-            gatherer_.gather(from,
-                             {.rays = rays,
-                              .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
-                              .seed = settings_.seed + 2,
-                              .wanted_in_group = {}},
-                             &series_.radiance, sum, nullptr);
-            take(sum, direct, out[i]);
-            sum.clear();
-            direct.clear();
-        }
-        rays_traced_ += range.size() * rays;
-        progress.advance(range.size());
     });
-    return out;
 }
 
-void Sites::take(TermAccumulator<ProbeLight>& sum, TermAccumulator<ProbeLight>& direct, SiteLight& out) const {
-    sum[always_group];  // every site has some
-    for (const uint32_t t : direct.touched()) sum[t];
-    for (const uint32_t t : sum.touched()) {
-        const ProbeLight& light = sum[t];
-        const Term& term = gatherer_.paths().terms()[t];
-        const float brightness = settings_.group_brightness.empty() ? 1 : settings_.group_brightness[term.group];
-        for (size_t state = 0; state < site_states; ++state)
-            if (counts(term, state))
-                for (size_t k = 0; k < 9; ++k) out.states[9 * state + k] += brightness * luminance(light.radiance[k]);
-        if (series_.active(t, luminance(direct[t].irradiance()), luminance(light.irradiance())))
-            out.terms.push_back({t, light, 0});
+uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
+                          const BakeSettings& settings, Progress& progress) {
+    const auto asked_groups = asked();
+    if (std::ranges::count(asked_groups, 1) == 0) return 0;
+    const LightGrid lights(gatherer.rays(), settings.light_grid, asked_groups);
+    // Blocks that miss the same groups are traced together: most often all of them.
+    std::map<std::vector<uint32_t>, std::vector<size_t>> passes;
+    for (size_t b = 0; b < blocks_.size(); ++b)
+        if (auto missing = missingAt(b); !missing.empty()) passes[std::move(missing)].push_back(b);
+    std::atomic<uint64_t> traced = 0;
+    for (const auto& [groups, blocks] : passes) {
+        std::vector<uint8_t> wanted(light_.size());
+        for (const uint32_t g : groups) wanted[g] = 1;
+        std::vector<std::pair<glm::vec3, uint32_t>> places;  // with their rays
+        for (const size_t b : blocks)
+            for (const glm::vec3& place : blocks_[b].places_m) places.emplace_back(place, blocks_[b].rays);
+        progress.stage("light at probe sites", places.size());
+        std::vector<Row> rows(places.size());
+        tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
+            PlaceTrace trace(gatherer, lights, radiance, reports, settings, wanted);
+            for (size_t i = range.begin(); i < range.end(); ++i)
+                traced += trace.trace(places[i].first, places[i].second, rows[i]);
+            progress.advance(range.size());
+        });
+        share(rows, blocks, groups, gatherer.paths());
     }
+    for (uint32_t g = 0; store_ && g < light_.size(); ++g)
+        if (asked_groups[g]) store_->keepSites(g, light_[g]);
+    return traced;
+}
+
+void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups,
+                      const DoorPaths& paths) {
+    const std::vector<uint32_t> number = numbersInGroups(paths);
+    for (const size_t b : blocks) {
+        const auto here = rows.first(blocks_[b].places_m.size());
+        rows = rows.subspan(here.size());
+        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g, paths, number)};
+    }
+}
+
+Sparse<ProbeTermLight> SiteLight::take(const DoorPaths& paths) {
+    const auto groups = static_cast<uint32_t>(light_.size());
+    std::vector<std::vector<uint32_t>> terms(groups);
+    for (uint32_t t = 0; t < paths.termCount(); ++t) terms[paths.terms()[t].group].push_back(t);
+    std::vector<std::pair<size_t, size_t>> where;  // block and row of each place
+    for (size_t b = 0; b < blocks_.size(); ++b)
+        for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) where.emplace_back(b, i);
+    auto all = Sparse<ProbeTermLight>::build(where.size(), [&](size_t begin, size_t end, auto emit) {
+        std::vector<ProbeTermLight> row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            for (uint32_t g = 0; g < groups; ++g)
+                for (const ProbeTermLight& l : light_[g][where[i].first].light.row(where[i].second))
+                    row.push_back({terms[g][l.term], l.light, 0, 0});
+            std::ranges::sort(row, {}, &ProbeTermLight::term);
+            emit(std::span<const ProbeTermLight>(row));
+        }
+    });
+    light_.clear();
+    return all;
+}
+
+std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
+    const std::vector<float> weights = weightsOfGroups(light, terms, even);
+    std::vector<FitValue> states(light.rows(), FitValue{});
+    tbb::parallel_for(size_t{0}, light.rows(), [&](size_t i) {
+        for (const ProbeTermLight& l : light.row(i)) {
+            const Term& term = terms[l.term];
+            if (!term.doors_open.empty()) continue;
+            for (const size_t state : {size_t{0}, size_t{1 + term.group % 2}})
+                for (size_t k = 0; k < 9; ++k)
+                    states[i][9 * state + k] += weights[term.group] * luminance(l.light.radiance[k]);
+        }
+    });
+    return states;
 }
 
 }  // namespace dimmer::cook

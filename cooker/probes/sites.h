@@ -1,4 +1,4 @@
-// Places where probes may stand, and the light there.
+// Places where probes may stand, and the light there, block by block and group by group, as a cache keeps it.
 #pragma once
 
 #include <bake/light_grid.h>
@@ -13,43 +13,54 @@
 
 namespace dimmer::cook {
 
-// The states that placement looks at: every set on; always-on light with every other set; the other sets.
-inline constexpr size_t site_states = 3;
+struct SiteChoice {
+    // All over the level; around each lamp; the free ones of the corners of the grid's box. A block depends on geometry
+    // and its own lamp alone. Empty: nothing is free.
+    std::vector<SiteBlock> blocks;
+    std::vector<bool> corner_free;  // which of the box's 8 corners the last block has
+    size_t probes_max = 0;          // as the settings and the level's size have it
+    double free_volume_m3 = 0;
 
-struct SiteLight {
-    FitValue states{};                  // luminance of the radiance, nine coefficients of each state
-    std::vector<ProbeTermLight> terms;  // always-on light first, then what is active there
+    // Of all blocks.
+    std::vector<glm::vec3> places() const;
 };
 
-// Reads what the series left; thread-safe.
-class Sites {
+Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings);
+
+// What is known of the light at the places, per group and block; the rest is to be traced.
+class SiteLight {
    public:
-    Sites(const Gatherer& gatherer, const Series& series, const BakeSettings& settings);
+    // Takes from `store` (null: nothing) what it has.
+    SiteLight(std::span<const SiteBlock> blocks, uint32_t groups, GroupStore* store);
 
-    // At most `count` places in the open, half of them evenly over the level, half around its lamps (all evenly where
-    // there is none), of at most 16 times as many tried; the share of the level's box that is open. The same places
-    // come first whatever the count.
-    std::vector<glm::vec3> choose(uint32_t count, double& free_share) const;
-    // From as many rays as the noise needs to be small beside what interpolation misses.
-    std::vector<SiteLight> trace(std::span<const glm::vec3> places, Progress& progress) const;
-    // Adds the direct light at a probe and returns, of what arrives in each term, what decides on activity.
-    void directAt(const GatherFrom& from, TermAccumulator<ProbeLight>& reflected,
-                  TermAccumulator<ProbeLight>& stored) const;
-
-    const Gatherer& gatherer() const { return gatherer_; }
-    uint64_t raysTraced() const { return rays_traced_; }
+    // Per group: whether something of its light is to be traced.
+    std::vector<uint8_t> asked() const;
+    // Traces that; `radiance` and `reports` have what the asked groups need. Keeps it in the store. From as many rays
+    // as the noise needs to be small beside what interpolation misses. Returns the rays traced.
+    uint64_t trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
+                   const BakeSettings& settings, Progress& progress);
+    // Per place, ascending, what is active there. Empties this.
+    Sparse<ProbeTermLight> take(const DoorPaths& paths);
 
    private:
-    void take(TermAccumulator<ProbeLight>& sum, TermAccumulator<ProbeLight>& direct, SiteLight& out) const;
+    using Row = std::vector<ProbeTermLight>;
+    std::vector<uint32_t> missingAt(size_t block) const;
+    void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups,
+               const DoorPaths& paths);
+    static Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group, const DoorPaths& paths,
+                                          std::span<const uint32_t> number);
+    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].light.rows() == 0; }
 
-    glm::vec3 nearLamp(uint32_t index) const;
-
-    const Gatherer& gatherer_;
-    std::vector<glm::vec3> lamps_;
-    const Series& series_;
-    const BakeSettings& settings_;
-    LightGrid lights_;
-    mutable std::atomic<uint64_t> rays_traced_ = 0;
+    std::span<const SiteBlock> blocks_;
+    GroupStore* store_;
+    std::vector<std::vector<SiteBlockLight>> light_;  // per group, per block; no rows: missing
 };
+
+// What placement looks at: all light together, then each half of the light sets, so that light which leaks from a set's
+// room into a dark one is seen; doors closed. Luminance of the radiance, nine coefficients of each state. Every group
+// counts by its own mean over those of the first `even` places (all over the level) that it reaches: where probes stand
+// does not depend on how bright a set is.
+inline constexpr size_t site_states = 3;
+std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even);
 
 }  // namespace dimmer::cook

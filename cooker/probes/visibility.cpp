@@ -9,7 +9,7 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t sample_count = 32;
+constexpr uint32_t samples_max = 32;
 constexpr uint32_t leak_cost = 3, miss_cost = 1;
 constexpr uint32_t lonely_miss_cost = 8;  // of a point that no other probe is taken to see
 constexpr std::array<int8_t, 4> seen_everywhere = {127, 127, 127, 127};
@@ -61,9 +61,10 @@ float value(const std::array<int8_t, 4>& row, const Weights& at) {
 
 class Table {
    public:
-    Table(const RayScene& rays, const std::array<glm::vec3, 4>& corners, const std::array<bool, 4>& free)
-        : rays_(rays), corners_(corners) {
-        for (uint32_t i = 0; i < sample_count; ++i) points_[i] = pointInside(sequence3d(i, 1));
+    Table(const RayScene& rays, const std::array<glm::vec3, 4>& corners, const std::array<bool, 4>& free,
+          uint32_t samples)
+        : rays_(rays), corners_(corners), samples_(samples) {
+        for (uint32_t i = 0; i < samples_; ++i) points_[i] = pointInside(sequence3d(i, 1));
         for (size_t v = 0; v < 4; ++v)
             if (free[v]) look(v);
     }
@@ -79,7 +80,7 @@ class Table {
 
    private:
     void look(size_t v) {
-        for (uint32_t i = 0; i < sample_count; ++i) {
+        for (uint32_t i = 0; i < samples_; ++i) {
             const Weights& w = points_[i];
             const glm::vec3 to = w[0] * corners_[0] + w[1] * corners_[1] + w[2] * corners_[2] + w[3] * corners_[3];
             const float distance = glm::distance(to, corners_[v]);
@@ -94,7 +95,7 @@ class Table {
 
     uint32_t cost(size_t v, const std::array<int8_t, 4>& row) const {
         uint32_t sum = 0;
-        for (uint32_t i = 0; i < sample_count; ++i) {
+        for (uint32_t i = 0; i < samples_; ++i) {
             const bool taken_for_seen = value(row, points_[i]) > 0;
             if (taken_for_seen != seen_[v][i]) sum += taken_for_seen ? leak_cost : miss_[v][i];
         }
@@ -117,7 +118,7 @@ class Table {
     // Points that some probe sees and none is taken to see count more from now on.
     bool markLonely(const TetrahedronVisibility& table) {
         bool any = false;
-        for (uint32_t i = 0; i < sample_count; ++i) {
+        for (uint32_t i = 0; i < samples_; ++i) {
             bool taken = false;
             for (size_t v = 0; v < 4; ++v) taken = taken || value(table.seen[v], points_[i]) > 0;
             for (size_t v = 0; v < 4 && !taken; ++v)
@@ -131,17 +132,18 @@ class Table {
 
     const RayScene& rays_;
     const std::array<glm::vec3, 4>& corners_;
-    std::array<Weights, sample_count> points_;
-    std::array<std::array<bool, sample_count>, 4> seen_{};
-    std::array<std::array<uint32_t, sample_count>, 4> miss_{};
+    uint32_t samples_;
+    std::array<Weights, samples_max> points_;
+    std::array<std::array<bool, samples_max>, 4> seen_{};
+    std::array<std::array<uint32_t, samples_max>, 4> miss_{};
     std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;  // planes that stopped rays
 };
 
 }  // namespace
 
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
-                                     const std::array<bool, 4>& free) {
-    return Table(rays, corners, free).find();
+                                     const std::array<bool, 4>& free, Look look) {
+    return Table(rays, corners, free, look == Look::Hasty ? samples_max / 2 : samples_max).find();
 }
 
 }  // namespace dimmer::cook

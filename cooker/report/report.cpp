@@ -142,6 +142,7 @@ class Report {
         budget("total", cost_.device(), profile.budget_total, cost_.device());
         budget("base lightmaps", cost_.base_lightmap, profile.budget_base_lightmaps, cost_.device());
         budget("dynamic records", cost_.dynamic, profile.budget_dynamic, cost_.device());
+        budget("global grid", cost_.global_grid, profile.budget_global_grid, cost_.device());
         budget("ancillary", cost_.ancillary, 0, cost_.device());
         body_ += "</div>\n";
     }

@@ -151,6 +151,54 @@ TEST_F(CachedCook, BudgetsAndNamesOfFilesMakeNoLight) {
                 ElementsAre("pack", "always-on light", "light set 'one'", "light set 'both'", "light set 'two'"));
 }
 
+// The same with a thing that moves, and so with a global grid.
+LevelFile houseWithGrid() {
+    LevelFile level = houseOfTwo();
+    level.addNode({{"name", "ball"}, {"translation", {1, 1, 1}}, {"extras", {{"dimmer_dynamic", true}}}});
+    return level;
+}
+
+std::vector<std::string> gridStages() {
+    return {"global grid", "light at probe places: always-on light", "light at probe places: light set 'one'",
+            "light at probe places: light set 'both'", "light at probe places: light set 'two'"};
+}
+
+TEST_F(CachedCook, ASetMadeBrighterLeavesTheGrid) {
+    LevelFile level = houseWithGrid();
+    made(level);
+    lamp(level, 2)["intensity"] = 137.31;
+    lamp(level, 2)["color"] = {0.3, 0.9, 0.7};
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    EXPECT_FALSE(run(level, true).pack.probes.global.empty());
+}
+
+// Of the other groups it asks for light at the new places around the lamp alone: from what their surfaces send out, or
+// where that is gone, from their bounces anew.
+TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
+    LevelFile level = houseWithGrid();
+    made(level);
+    std::vector<std::string> stages = {"pack", "light set 'two'"};
+    for (const std::string& stage : gridStages()) stages.push_back(stage);
+    const auto move = [&](double x) {
+        for (json& node : level.document["nodes"])
+            if (node.value("name", "") == "lamp3") node["translation"][0] = x;
+    };
+    move(8.7);
+    EXPECT_EQ(made(level), stages);
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache"))
+        if (entry.path().filename().string().starts_with("radiance-")) std::filesystem::remove(entry.path());
+    move(8.6);
+    EXPECT_EQ(made(level), stages);
+}
+
+TEST_F(CachedCook, APlayAreaMakesTheGridAlone) {
+    LevelFile level = houseWithGrid();
+    made(level);
+    const int area = level.addNode({{"name", "play"}, {"extras", {{"dimmer_play_area", 1}}}});
+    level.node(area)["translation"] = {2, 1, 1};
+    EXPECT_THAT(made(level), ElementsAre("pack", "global grid"));
+}
+
 TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
     const LevelFile level = houseOfTwo();
     made(level);

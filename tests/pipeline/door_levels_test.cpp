@@ -17,7 +17,7 @@ Profile coarse() {
     auto profile = loadProfile("desktop");
     EXPECT_TRUE(profile);
     profile->texels_per_metre = 0.5f;
-    profile->probes_max = 0;  // doors and lightmaps are looked at here
+    profile->global_grid = GridMode::Off;  // doors and lightmaps are looked at here
     profile->draft = {
         .samples_per_texel = 1, .series_rays = 8, .rays = 32, .emitter_samples = 1, .bounces = 8, .tolerance = 0.05f};
     return *profile;

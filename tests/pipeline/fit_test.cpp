@@ -36,7 +36,7 @@ struct Fit : testing::Test {
                              const std::string& pack = "level.dimmer") {
         // Losses are predicted for lightmaps; the global grid's records are not among them.
         const auto profile =
-            writeText(folder, "mine.json", "{" + budgets + "\"grids\": {\"probes_max\": 0}," + quick_bake + "}");
+            writeText(folder, "mine.json", "{" + budgets + "\"grids\": {\"global\": \"off\"}," + quick_bake + "}");
         SilentProgress silent;
         CookOptions options{
             .level = level, .pack = folder.path / pack, .profile = profile.string(), .quality = "draft", .set = set};
@@ -135,6 +135,58 @@ TEST_F(Fit, DensityWhereThePagesAreTooLarge) {
     EXPECT_LT(fitted->profile.texels_per_metre, whole->profile.texels_per_metre);
     // Not thrown away: half of the texels were asked for, and a third at least are there.
     EXPECT_GT(costOf(fitted->pack).base_lightmap, costOf(whole->pack).base_lightmap / 3);
+}
+
+// Half of the texels belong to meshes with a density of their own.
+TEST_F(Fit, DensityIsNotSaidToSaveMoreThanItDoes) {
+    LevelFile mixed = corridor();
+    const int white = addWhite(mixed);
+    mixed.addNode({{"name", "fixed"},
+                   {"mesh", addRoomMesh(mixed, {0, 0, 0}, 4, white)},
+                   {"translation", {0, 0, 12}},
+                   {"scale", {5, 0.7, 0.7}},
+                   {"extras", {{"dimmer_texel_density", 4}}}});
+    const int lamp = mixed.addLight("other", {{"type", "point"}, {"intensity", 50}}, {{"dimmer_light_set", "other"}});
+    mixed.node(lamp)["translation"] = {8, 2, 13};
+    level = writeLevel(folder, mixed, "mixed.gltf");
+    const auto whole = run("", false);
+    ASSERT_TRUE(whole.has_value()) << whole.error().message;
+    const PackCost before = costOf(whole->pack);
+    const auto fitted =
+        run(fmt::format(R"("budgets": {{"base_lightmaps": {}}}, )", before.base_lightmap * 3 / 4), true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    const Remedy& remedy = fitted->fitted.at(0);
+    const Change& change = remedy.changes.at(0);
+    const auto taken = run("", false, {fmt::format("{}={}", change.key, change.to)}, "taken.dimmer");
+    ASSERT_TRUE(taken.has_value()) << taken.error().message;
+    const auto saved = static_cast<double>(before.device() - costOf(taken->pack).device());
+    const auto predicted = static_cast<double>(remedy.saves);
+    printf("density: predicted %.0f bytes, saved %.0f of %.0f\n", predicted, saved,
+           static_cast<double>(before.device()));
+    // Pages are rectangles that charts do not fill, and padding stays: a quarter of what is saved either way.
+    EXPECT_NEAR(predicted, saved, 0.25 * saved);
+}
+
+TEST_F(Fit, FewerProbesWhereTheGridIsTooLarge) {
+    const std::vector<std::string> grid = {"grids.global=on"};
+    const auto whole = run("", false, grid);
+    ASSERT_TRUE(whole.has_value()) << whole.error().message;
+    const uint64_t all = costOf(whole->pack).global_grid;
+    ASSERT_GT(all, 0u);
+    const std::string budgets = fmt::format(R"("budgets": {{"global_grid": {}}}, )", all / 2);
+    const auto over = run(budgets, false, grid);
+    ASSERT_FALSE(over.has_value());
+    EXPECT_EQ(over.error().code, ErrorCode::OverBudget);
+    EXPECT_THAT(over.error().message, HasSubstr("global grid: "));
+    EXPECT_THAT(over.error().message, HasSubstr("grids.probes_max 20000 -> "));
+    EXPECT_EQ(std::ranges::count(over.error().message, '\n'), 1);  // nothing else helps, and nothing else is named
+    const auto fitted = run(budgets, true, grid);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    const uint64_t left = costOf(fitted->pack).global_grid;
+    EXPECT_LE(left, all / 2);
+    // Tetrahedra and the table of cells do not go quite with the number of probes.
+    EXPECT_NEAR(static_cast<double>(fitted->fitted.at(0).saves), static_cast<double>(all - left),
+                0.15 * static_cast<double>(all));
 }
 
 TEST_F(Fit, OneElement) {

@@ -2,6 +2,7 @@
 #include <bake/baked_scene.h>
 #include <bake/test_scenes.h>
 #include <gtest/gtest.h>
+#include <pipeline/cook.h>
 #include <pipeline/small_level.h>
 #include <probes/placement.h>
 #include <probes/spherical_harmonics.h>
@@ -198,6 +199,28 @@ TEST(PlayAreas, AreBoxes) {
     EXPECT_FALSE(area.contains({6.1f, 1, 0}));
     EXPECT_FALSE(area.contains({4, 2.1f, 0}));
     EXPECT_FALSE(area.contains({4, 1, 3.1f}));
+}
+
+TEST(GlobalGridSetting, IsMadeWhereSomethingMoves) {
+    Profile profile;
+    Scene scene;
+    EXPECT_FALSE(wantsGrid(profile, scene));
+    scene.meshes.emplace_back().lighting = Lighting::Lightmap;
+    EXPECT_FALSE(wantsGrid(profile, scene));
+    for (const Lighting lighting : {Lighting::Dynamic, Lighting::LocalGrid}) {
+        Scene moving = scene;
+        moving.meshes.emplace_back().lighting = lighting;
+        EXPECT_TRUE(wantsGrid(profile, moving));
+    }
+    Scene marked = scene, played = scene;
+    marked.dynamic_places_m.emplace_back(0);
+    played.play_areas.emplace_back();
+    EXPECT_TRUE(wantsGrid(profile, marked));
+    EXPECT_TRUE(wantsGrid(profile, played));
+    profile.global_grid = GridMode::Off;
+    EXPECT_FALSE(wantsGrid(profile, marked));
+    profile.global_grid = GridMode::On;
+    EXPECT_TRUE(wantsGrid(profile, scene));
 }
 
 }  // namespace

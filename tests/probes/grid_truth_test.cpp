@@ -32,7 +32,9 @@ TEST(GridTruth, TwoRooms) {
     ASSERT_TRUE(scene) << scene.error().message;
     SilentProgress progress;
     CookStats stats;
-    auto data = cookScene(*scene, *loadProfile("desktop"), "draft", progress, stats);
+    auto profile = *loadProfile("desktop");
+    profile.global_grid = GridMode::On;  // nothing moves there
+    auto data = cookScene(*scene, profile, "draft", progress, stats);
     ASSERT_TRUE(data) << data.error().message;
     const auto pack = Pack::fromData(std::move(*data));
     ASSERT_TRUE(pack) << pack.error().message;
