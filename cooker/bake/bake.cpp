@@ -6,6 +6,7 @@
 #include <bake/group_light.h>
 #include <bake/series.h>
 #include <probes/grid_bake.h>
+#include <probes/local_bake.h>
 
 #include <atomic>
 
@@ -66,6 +67,7 @@ std::vector<uint32_t> bakeGroups(const Gatherer& gatherer, const BakeSettings& s
     baked.rays = series.rays;
     baked.door_flux = doorFlux(gatherer, series, settings, groups, progress);
     baked.light = gatherAll(gatherer, series, settings, groups, progress, baked.rays);
+    baked.local_light = bakeLocalGrids(gatherer, series, settings, groups, progress, baked.rays, baked.warnings);
     if (with_grid)
         if (auto grid = bakeGrid(gatherer, series, settings, progress, baked); !grid)
             baked.warnings.push_back("no global grid: " + grid.error().message);
@@ -102,10 +104,12 @@ Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, con
             if (missing[g]) store->keep(g, lightOfGroup(baked, g, bounces[g]));
     } else {
         baked.light = Sparse<ReceiverLight>::Builder(texels.size()).finish();
+        baked.local_light = Sparse<ProbeTermLight>::Builder(found[always_group]->local_light.rows()).finish();
     }
     addGroups(found, baked);
-    for (size_t i = 0; i < baked.grid.light.rows(); ++i)
-        for (const ProbeTermLight& l : baked.grid.light.row(i)) ++baked.reports[l.term].receivers;
+    for (const auto* probes : {&baked.grid.light, &baked.local_light})
+        for (size_t i = 0; i < probes->rows(); ++i)
+            for (const ProbeTermLight& l : probes->row(i)) ++baked.reports[l.term].receivers;
     baked.dependent_doors = dependentDoors(baked.door_flux, settings);
     if (baked.bounces == settings.bounces_max)
         baked.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");

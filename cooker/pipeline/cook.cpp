@@ -8,11 +8,13 @@
 #include <charts/wall_cuts.h>
 #include <cluster/cluster.h>
 #include <encode/encode.h>
+#include <models/scene_models.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
+#include <pipeline/model_meshes.h>
+#include <pipeline/prepare_scene.h>
 #include <pipeline/set_scales.h>
 #include <pipeline/settings.h>
-#include <scene/open_pose.h>
 #include <trace/ray_scene.h>
 #include <update/state_text.h>
 #include <write/pack_writer.h>
@@ -151,7 +153,7 @@ void stripFile(std::vector<std::string>& warnings, const std::string& file) {
 Expected<void> chart(Scene& scene, const Profile& profile, const Quality& quality, Progress& progress, CookCache* cache,
                      Charted& out) {
     progress.stage("charts", 2);
-    addOpenLeaves(scene);
+    prepareScene(scene, profile);
     if (cache) {
         const Key geometry = geometryKey(scene);
         out.key = chartsKey(geometry, unwrapOptions(profile), quality.samples_per_texel);
@@ -295,9 +297,11 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, contribution_of_term, pack);
-        buildProbeClusters(baked.grid, contribution_of_term, pack);
+        buildProbeClusters(baked, contribution_of_term, pack);
+        pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));
         stats.free_volume_m3 = baked.grid.free_volume_m3;
         pack.meshes = levelMeshes(rays, charts, scales.emission_cd_m2);
+        describeModels(scene, scales.emission_cd_m2, pack);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);
         progress.advance(1);

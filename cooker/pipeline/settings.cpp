@@ -160,7 +160,9 @@ std::vector<Setting> settingsOf(Profile& p) {
                     "metres between probes of the global grid at least; light around a lamp changes over a hand's "
                     "breadth"});
     list.push_back({"grids.local_spacing", &p.local_spacing_m, 0.1, 100,
-                    "metres between the probes of a model's own grid; unused until local grids are baked"});
+                    "metres between the probes of a model's own grid at most, where its node does not say"});
+    list.push_back({"grids.local_probes_max", &p.local_probes_max, 8, 4096,
+                    "light probes of one model's own grid at most; a larger model's stand further apart"});
     for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}})
         addQuality(name, *q, list);
     return list;

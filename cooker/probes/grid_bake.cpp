@@ -1,82 +1,15 @@
 #include <probes/grid_bake.h>
 
-#include <bake/final_gather.h>
 #include <bake/sampling.h>
 #include <probes/placement.h>
+#include <probes/probe_gather.h>
 
 #include <algorithm>
 
 namespace dimmer::cook {
 namespace {
 
-// Rays go all around, and there are few probes: more of them than a texel gets.
-constexpr uint32_t rays_per_texel_ray = 4;
 constexpr uint32_t probe_seed = 0x9b05688cu;
-
-class GridGather {
-   public:
-    GridGather(const Sites& sites, const Series& series, const BakeSettings& settings)
-        : sites_(sites),
-          gatherer_(sites.gatherer()),
-          series_(series),
-          settings_(settings),
-          floors_(noiseFloors(series)),
-          options_(finalGatherOptions(settings, floors_)),
-          final_(gatherer_),
-          sum_(gatherer_.paths().termCount()),
-          direct_(gatherer_.paths().termCount()),
-          stored_(gatherer_.paths().termCount()) {
-        options_.rays_max *= rays_per_texel_ray;
-    }
-
-    // `wanted`: terms to gather besides those that are active at the probe itself, ascending.
-    uint64_t gather(glm::vec3 position_m, uint32_t number, std::span<const uint32_t> wanted,
-                    std::vector<ProbeTermLight>& row) {
-        const SamplePoint point{position_m, no_face};
-        const GatherFrom from = Gatherer::atProbe(point, probe_seed + number);
-        findActive(from, wanted);
-        row.clear();
-        const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row);
-        for (ProbeTermLight& l : row)
-            if (const auto touched = stored_.touched(); std::ranges::binary_search(touched, l.term))
-                l.light += stored_[l.term];
-        stored_.clear();
-        return traced + settings_.series_rays;
-    }
-
-   private:
-    // As for texels: lit straight, or by as much as the term's threshold asks.
-    void findActive(const GatherFrom& from, std::span<const uint32_t> wanted) {
-        sites_.directAt(from, direct_, stored_);
-        gatherer_.gather(from,
-                         {.rays = settings_.series_rays,
-                          .emitter_samples = settings_.emitter_samples,
-                          .seed = settings_.seed,
-                          .wanted_in_group = {}},
-                         &series_.radiance, sum_, nullptr);
-        active_.assign(wanted.begin(), wanted.end());
-        active_.push_back(always_group);
-        for (auto* light : {&direct_, &sum_}) {
-            for (const uint32_t t : light->touched()) {
-                const float lux = luminance((*light)[t].irradiance());
-                if (t != always_group && series_.active(t, 0, lux)) active_.push_back(t);
-            }
-            light->clear();
-        }
-        std::ranges::sort(active_);
-        active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
-    }
-
-    const Sites& sites_;
-    const Gatherer& gatherer_;
-    const Series& series_;
-    const BakeSettings& settings_;
-    std::vector<float> floors_;
-    FinalGatherOptions options_;
-    FinalGather<ProbeLight> final_;
-    TermAccumulator<ProbeLight> sum_, direct_, stored_;
-    std::vector<uint32_t> active_;
-};
 
 glm::vec3 vec(const ProbePosition& p) {
     return {p.x_m, p.y_m, p.z_m};
@@ -183,11 +116,12 @@ Expected<void> bakeGrid(const Gatherer& gatherer, const Series& series, const Ba
     // Blocks of rows are large for so few receivers, so each row is made on its own.
     std::vector<std::vector<ProbeTermLight>> rows(probes);
     tbb::parallel_for(tbb::blocked_range<size_t>(0, probes, 16), [&](const auto& range) {
-        GridGather gather(sites, series, settings);
+        ProbeGather gather(sites, series, settings);
         uint64_t traced = 0;
         for (size_t i = range.begin(); i < range.end(); ++i)
             if (placed->sources[i] == i)
-                traced += gather.gather(vec(placed->grid.positions[i]), static_cast<uint32_t>(i), around[i], rows[i]);
+                traced += gather.gather(vec(placed->grid.positions[i]), probe_seed + static_cast<uint32_t>(i),
+                                        around[i], {}, no_model, rows[i]);
         rays += traced;
         progress.advance(range.size());
     });
