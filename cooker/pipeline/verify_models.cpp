@@ -11,7 +11,8 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t tries_per_point = 20;
-constexpr float covered_m = 0.01f;
+constexpr float covered_m = 0.01f, behind_m = 1e-3f;
+constexpr int surfaces_max = 8;
 
 glm::vec3 vec(const std::array<float, 3>& a) {
     return {a[0], a[1], a[2]};
@@ -81,7 +82,19 @@ ModelPoint pointOn(const Pack& pack, const ModelTriangle& t, glm::vec2 u) {
     return out;
 }
 
-std::vector<ModelPoint> choosePoints(const Pack& pack, const RayScene& rays, uint32_t count, uint32_t seed) {
+// What stands on the floor or leans on a wall has sides that nobody sees: something else lies on the place.
+bool covered(const RayScene& rays, const std::string& node, const ModelPoint& p) {
+    float from_m = -behind_m;
+    for (int i = 0; i < surfaces_max; ++i) {
+        const auto hit = rays.nearest(p.position_m + from_m * p.normal, p.normal, covered_m - from_m, 0);
+        if (!hit) return false;
+        if (rays.scene().meshes[rays.triangles()[hit->triangle].mesh].node != node) return true;
+        from_m += hit->distance_m + 1e-5f;
+    }
+    return false;
+}
+
+std::vector<ModelPoint> chooseModelPoints(const Pack& pack, const RayScene& rays, uint32_t count, uint32_t seed) {
     std::vector<ModelPoint> points;
     const auto triangles = standingTriangles(pack);
     if (triangles.empty()) return points;
@@ -93,9 +106,8 @@ std::vector<ModelPoint> choosePoints(const Pack& pack, const RayScene& rays, uin
         const ModelPoint p = pointOn(pack, *t, {u.x, u.y});
         TangentFrame frame{{}, {}, p.normal};
         orthonormalBasis(p.normal, frame.tangent, frame.bitangent);
-        // What stands on the floor or leans on a wall has sides that nobody sees.
-        const bool covered = rays.nearest(p.position_m + 1e-3f * p.normal, p.normal, covered_m, i).has_value();
-        if (!covered && !hidden(rays, p.position_m, frame, hash(seed, i))) points.push_back(p);
+        if (!covered(rays, pack.models()[t->model].node, p) && !hidden(rays, p.position_m, frame, hash(seed, i)))
+            points.push_back(p);
     }
     return points;
 }
@@ -104,7 +116,7 @@ std::vector<ModelPoint> choosePoints(const Pack& pack, const RayScene& rays, uin
 
 Expected<ModelFigures> verifyModels(const ReferenceTracer& tracer, const RayScene& rays, const Pack& pack,
                                     const VerifyOptions& options, double floor_lux, Progress& progress) {
-    const auto points = choosePoints(pack, rays, options.points, options.seed);
+    const auto points = chooseModelPoints(pack, rays, options.points, options.seed);
     if (points.empty()) return ModelFigures{};
     CpuRuntime runtime(pack);
     if (auto ok = runtime.apply(options.state); !ok) return std::unexpected(ok.error());
