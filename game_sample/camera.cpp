@@ -14,10 +14,6 @@ namespace {
 constexpr std::string_view player_start = "player_start";
 constexpr float near_m = 0.05f, far_m = 500.0f;
 
-glm::vec3 toVec3(const std::array<float, 3>& v) {
-    return {v[0], v[1], v[2]};
-}
-
 CameraPose pose(const Viewpoint& viewpoint) {
     return {toVec3(viewpoint.position_m), toVec3(viewpoint.forward), viewpoint.vertical_fov_rad};
 }

@@ -4,10 +4,15 @@
 #include <dimmer/error.h>
 #include <dimmer/pack.h>
 
+#include <array>
 #include <glm/glm.hpp>
 #include <string_view>
 
 namespace dimmer::sample {
+
+inline glm::vec3 toVec3(const std::array<float, 3>& v) {
+    return {v[0], v[1], v[2]};
+}
 
 struct CameraPose {
     glm::vec3 position_m{0};

@@ -13,10 +13,6 @@ namespace {
 
 constexpr size_t bytes_per_pixel = 4 * sizeof(uint16_t);
 
-glm::vec3 toVec3(const std::array<float, 3>& v) {
-    return {v[0], v[1], v[2]};
-}
-
 glm::vec3 emission(const Mesh& mesh, const LightState& lights) {
     const glm::vec3 radiance = toVec3(mesh.emission_cd_m2);
     if (!mesh.emission_set) return radiance;

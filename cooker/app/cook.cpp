@@ -15,7 +15,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct CookArguments {
     CookOptions options;
     std::string json;
     std::string write_level;
@@ -91,7 +91,7 @@ nlohmann::ordered_json toJson(const CookResult& result) {
     return json;
 }
 
-Expected<void> writeReport(const CookResult& result, const Arguments& a) {
+Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
     const auto pack = Pack::fromData(PackData(result.pack));
     if (!pack) return std::unexpected(pack.error());
     ReportInput input;
@@ -102,7 +102,7 @@ Expected<void> writeReport(const CookResult& result, const Arguments& a) {
     return writeReport(*pack, input, a.report);
 }
 
-int run(const Arguments& a) {
+int run(const CookArguments& a) {
     if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
     if (!a.json.empty() && a.json != "-")
         if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
@@ -140,7 +140,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addCookCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<CookArguments>();
     auto* c = app.add_subcommand("cook", "Bake a level and write its pack");
     c->add_option("LEVEL", a->options.level, "the level, .glb or .gltf (see docs/level.md)")->required();
     c->add_option("-o,--output", a->options.pack, "the pack to write, e.g. house.dimmer")->required();

@@ -14,7 +14,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct ExplainArguments {
     std::string pack, state, json;
     std::vector<float> point, normal;
 };
@@ -84,7 +84,7 @@ void printAbsent(const PackData& d, const Explanation& e) {
         fmt::join(absent, "\n  "));
 }
 
-nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Arguments& a) {
+nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const ExplainArguments& a) {
     using Json = nlohmann::ordered_json;
     const Mesh& mesh = d.meshes[e.surface.mesh];
     const glm::vec3 n = e.surface.frame.normal;
@@ -121,7 +121,7 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Arg
     return j;
 }
 
-int run(const Arguments& a) {
+int run(const ExplainArguments& a) {
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     const auto finite = [](float v) { return std::isfinite(v); };
@@ -147,7 +147,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addExplainCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<ExplainArguments>();
     auto* c = app.add_subcommand("explain", "What lights a place, and what that costs");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--point", a->point,

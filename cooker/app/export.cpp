@@ -9,11 +9,11 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct ExportArguments {
     std::string pack, folder;
 };
 
-int run(const Arguments& a) {
+int run(const ExportArguments& a) {
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     TerminalProgress progress;
@@ -26,7 +26,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addExportCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<ExportArguments>();
     auto* c = app.add_subcommand("export", "Pages and contributions as OpenEXR, for engines that blend on their own");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("DIR", a->folder, "the folder to write into, created when missing")->required();

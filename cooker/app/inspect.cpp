@@ -15,7 +15,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct InspectArguments {
     std::string pack;
     std::string json;
     bool settings = false;
@@ -211,7 +211,7 @@ void printSettings(const PackData& d) {
         fmt::print("{:<32} {:<16} {}\n", key, setting["value"].dump(), setting["from"].get<std::string>());
 }
 
-int run(const Arguments& a) {
+int run(const InspectArguments& a) {
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     std::error_code ignored;
@@ -230,7 +230,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addInspectCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<InspectArguments>();
     auto* c = app.add_subcommand("inspect", "What a pack holds and what it costs");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--json", a->json, "write the same as JSON to a file; alone or with -: to stdout")

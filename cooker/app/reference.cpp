@@ -11,7 +11,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct ReferenceArguments {
     std::string level, points, state, output = "-";
     uint32_t paths = 4096, seed = 1;
 };
@@ -31,7 +31,7 @@ Expected<void> writeValues(const std::string& file, std::span<const QueryPoint> 
     return {};
 }
 
-int run(const Arguments& a) {
+int run(const ReferenceArguments& a) {
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto state = readReferenceState(*scene, a.state);
@@ -55,7 +55,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addReferenceCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<ReferenceArguments>();
     auto* c = app.add_subcommand("reference", "Irradiance at points, by the reference path tracer (no pack needed)");
     c->add_option("LEVEL", a->level, "the level, .glb or .gltf")->required();
     c->add_option("--points", a->points, "CSV with the header x,y,z,nx,ny,nz (metres, glTF axes); - for stdin")

@@ -11,7 +11,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct ReportArguments {
     std::string pack, output, cook_json, verify_json, heat_maps;
 };
 
@@ -36,7 +36,7 @@ Expected<void> addCook(const std::string& file, ReportInput& input) {
     return {};
 }
 
-int run(const Arguments& a) {
+int run(const ReportArguments& a) {
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     ReportInput input;
@@ -64,7 +64,7 @@ Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std
 }
 
 void addReportCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<ReportArguments>();
     auto* c = app.add_subcommand("report", "A pack as one HTML page: what costs what, and where");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("-o,--output", a->output, "the file to write, e.g. house.html")->required();

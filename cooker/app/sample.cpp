@@ -12,7 +12,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct SampleArguments {
     std::string pack, points, state, from = "surface", backend = "cpu", output = "-";
 };
 
@@ -44,7 +44,7 @@ Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
     return LightPages{std::move(pages->irradiance), std::move(pages->direction), std::move(pages->probes)};
 }
 
-int run(const Arguments& a) {
+int run(const SampleArguments& a) {
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     const auto points = readPoints(a.points);
@@ -68,7 +68,7 @@ int run(const Arguments& a) {
 }  // namespace
 
 void addSampleCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<SampleArguments>();
     auto* c = app.add_subcommand("sample", "Irradiance in lux at points, from the pages that the runtime blends");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--points", a->points, "CSV with the header x,y,z,nx,ny,nz (metres, glTF axes); - for stdin")

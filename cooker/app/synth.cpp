@@ -10,7 +10,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct SynthArguments {
     std::string like, output;
     SynthOptions options;
 };
@@ -21,7 +21,7 @@ std::vector<std::string> levelNames() {
     return names;
 }
 
-int run(Arguments& a) {
+int run(SynthArguments& a) {
     a.options.level = *productionLevel(a.like);
     auto data = synthesise(a.options);
     if (!data) return reportError(data.error());
@@ -37,7 +37,7 @@ int run(Arguments& a) {
 }  // namespace
 
 void addSynthCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<SynthArguments>();
     auto* c = app.add_subcommand("synth", "A pack with the statistics of a production level and random records");
     c->add_option("--like", a->like, "the level, of Table 1 of UBERBAKE")
         ->required()

@@ -11,7 +11,7 @@
 namespace dimmer::cook {
 namespace {
 
-struct Arguments {
+struct VerifyArguments {
     std::string level, pack, json, heatmap;
     VerifyOptions options;
     double max_error = -1;  // below 0: no limit
@@ -94,7 +94,7 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     return j;
 }
 
-int run(Arguments a) {
+int run(VerifyArguments a) {
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto pack = Pack::open(a.pack);
@@ -116,7 +116,7 @@ int run(Arguments a) {
 }  // namespace
 
 void addVerifyCommand(CLI::App& app, int& exit_code) {
-    auto a = std::make_shared<Arguments>();
+    auto a = std::make_shared<VerifyArguments>();
     auto* c = app.add_subcommand("verify", "A pack's error against the reference path tracer");
     c->add_option("LEVEL", a->level, "the level that the pack was cooked from")->required();
     c->add_option("PACK", a->pack, "a cooked pack")->required();

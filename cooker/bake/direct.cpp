@@ -12,7 +12,6 @@ namespace {
 
 // A far light's shadow changes little across a texel's points: one ray, from a point that differs between lights.
 constexpr float near_m = 10;
-constexpr float sun_distance_m = 1e30f;
 
 }  // namespace
 
@@ -36,7 +35,7 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
             const float weight = Light::Intake::weight(direction);
             if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
             ++traced;
-            const float distance_m = std::isinf(lit.distance_m) ? sun_distance_m : lit.distance_m;
+            const float distance_m = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
             forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
                        [&](float passed, uint32_t path) {
                            const uint32_t term = paths.term(groupOf(light.light_set), path);

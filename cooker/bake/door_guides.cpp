@@ -15,8 +15,7 @@ namespace {
 
 constexpr uint32_t door_points = 256;
 // Lamps that bring less than this share of their group's light at a point of the door light no patch worth a box.
-constexpr float share_min = 0.01f;
-constexpr float far_away_m = 1e30f;
+constexpr float flux_share_min = 0.01f;
 // Boxes of patches have some thickness, so that every point sees them from outside.
 constexpr float inflate_m = 0.05f;
 // The door's own box takes this share of the rays where there are patches too.
@@ -67,7 +66,7 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t
         }
         for (const Illumination& l : lit) {
             const float flux = luminance(l.irradiance_lux);
-            if (!(flux > share_min * sum)) continue;
+            if (!(flux > flux_share_min * sum)) continue;
             const float distance_m = std::isinf(l.distance_m) ? far_away_m : l.distance_m;
             if (!(rays.transmittance(point, l.towards_light, distance_m, Surfaces::Walls) > 0)) continue;
             const auto hit = rays.nearest(point, -l.towards_light, far_away_m, hash(seed, i), Surfaces::Walls);

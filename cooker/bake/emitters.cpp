@@ -10,11 +10,9 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float cell_min_m = 2;
-constexpr float cells_per_axis_max = 48;
 // An emitter with less than this share of its group's light in a cell is left to the gather rays: they still find it,
 // with full weight, so nothing is lost.
-constexpr float share_min = 1e-3f;
+constexpr float choice_share_min = 1e-3f;
 // A group that fills less than this share of the hemisphere from a cell is left to them too.
 constexpr float coverage_min = 1e-5f;
 
@@ -49,16 +47,10 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     if (emitters_.empty()) return;
     for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
 
-    const glm::vec3 extent = rays.boundsMax() - rays.boundsMin();
-    cell_m_ = std::max(cell_min_m, std::max(extent.x, std::max(extent.y, extent.z)) / cells_per_axis_max);
-    origin_ = rays.boundsMin();
-    size_ = glm::uvec3(glm::floor(extent / cell_m_)) + 1u;
-    cells_.resize(size_t{size_.x} * size_.y * size_.z);
-    const float radius = 0.5f * std::sqrt(3.0f) * cell_m_;
-    tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) {
-        const glm::uvec3 c(i % size_.x, i / size_.x % size_.y, i / size_.x / size_.y);
-        fillCell(cells_[i], origin_ + (glm::vec3(c) + 0.5f) * cell_m_, radius);
-    });
+    grid_ = {rays.boundsMin(), rays.boundsMax()};
+    cells_.resize(grid_.count());
+    const float radius = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
+    tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(cells_[i], grid_.centre(i), radius); });
     first_range_.push_back(0);
     for (Cell& cell : cells_) {
         for (GroupRange r : cell.ranges) {
@@ -89,7 +81,7 @@ void EmitterSampler::fillCell(Cell& cell, glm::vec3 centre, float radius_m) cons
             sum += weight;
         }
         begin = end;
-        auto keep = [&](const Choice& c) { return c.probability >= share_min * sum; };
+        auto keep = [&](const Choice& c) { return c.probability >= choice_share_min * sum; };
         const auto tail =
             std::stable_partition(cell.choices.begin() + static_cast<long>(first), cell.choices.end(), keep);
         cell.choices.erase(tail, cell.choices.end());
@@ -107,12 +99,6 @@ void EmitterSampler::fillCell(Cell& cell, glm::vec3 centre, float radius_m) cons
         cell.ranges.push_back({group, identities_[group], static_cast<uint32_t>(first),
                                static_cast<uint32_t>(cell.choices.size() - first)});
     }
-}
-
-uint32_t EmitterSampler::cellAt(glm::vec3 point) const {
-    const glm::vec3 p = glm::clamp((point - origin_) / cell_m_, glm::vec3(0), glm::vec3(size_) - 0.5f);
-    const glm::uvec3 c(p);
-    return (c.z * size_.y + c.y) * size_.x + c.x;
 }
 
 std::span<const EmitterSampler::GroupRange> EmitterSampler::groups(uint32_t cell) const {

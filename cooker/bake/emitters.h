@@ -1,6 +1,7 @@
 // Emissive triangles as light sources: which to sample from where, and how likely that is.
 #pragma once
 
+#include <bake/cell_grid.h>
 #include <bake/sparse_light.h>
 #include <trace/ray_scene.h>
 
@@ -44,7 +45,7 @@ class EmitterSampler {
         uint32_t identity;      // of the group, for seeds
         uint32_t first, count;  // into the choices
     };
-    uint32_t cellAt(glm::vec3 point) const;
+    uint32_t cellAt(glm::vec3 point) const { return grid_.at(point); }
     std::span<const GroupRange> groups(uint32_t cell) const;
 
     EmitterSample sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 on_triangle) const;
@@ -72,9 +73,7 @@ class EmitterSampler {
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;
     std::vector<uint32_t> identities_;  // per light group
-    glm::vec3 origin_{0};
-    float cell_m_ = 1;
-    glm::uvec3 size_{1};
+    CellGrid grid_;
     std::vector<Cell> cells_;
     // All cells' choices in one array each, so that ranges stay valid.
     std::vector<uint32_t> first_range_;

@@ -10,7 +10,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float far_away_m = 1e30f;
 // Shadow rays stop this short of the emitter they aim at, so as not to hit it.
 constexpr float shadow_end_share = 1 - 1e-4f;
 

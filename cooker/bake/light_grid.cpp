@@ -12,8 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float cell_min_m = 2;
-constexpr float cells_per_axis_max = 48;
 // Rays are followed in steps of this share of a cell: short enough not to cut more than corners.
 constexpr float step_share = 0.5f;
 // Lights further outside of the level are no lamps of its: their rays would miss it.
@@ -55,14 +53,11 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
         (unlisted ? everywhere_ : sought).push_back(l);
     }
     if (sought.empty()) return;
-    const glm::vec3 extent = rays.boundsMax() - rays.boundsMin();
-    cell_m_ = std::max(cell_min_m, std::max(extent.x, std::max(extent.y, extent.z)) / cells_per_axis_max);
-    origin_ = rays.boundsMin();
-    size_ = glm::uvec3(glm::floor(extent / cell_m_)) + 1u;
+    grid_ = {rays.boundsMin(), rays.boundsMax()};
 
     std::vector<std::vector<uint32_t>> reached(sought.size());
     tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, sought[i]); });
-    first_.assign(cellCount() + 1, 0);
+    first_.assign(grid_.count() + 1, 0);
     for (const auto& cells : reached)
         for (const uint32_t cell : cells) ++first_[cell + 1];
     for (size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
@@ -79,16 +74,16 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
     // The way to the neighbouring rays, per metre: no direction is further from its nearest ray, so that in the open
     // nothing is missed however far.
     const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));
-    std::vector<uint8_t> marks(cellCount());
+    std::vector<uint8_t> marks(grid_.count());
     for (uint32_t i = 0; i < light_probe_rays; ++i) {
         // Through doors: what is behind them is lit once they open.
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
         const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i), Surfaces::Walls);
         const float stop_m = hit ? hit->distance_m : far_m;
-        for (float m = 0; m < stop_m; m += step_share * cell_m_)
+        for (float m = 0; m < stop_m; m += step_share * grid_.cellSize())
             markAround(light.position_m + d * m, spread * m, marks);
         // Surfaces receive, and theirs is the light: generously around what a ray hit.
-        markAround(light.position_m + d * stop_m, std::max(0.5f * cell_m_, spread * stop_m), marks);
+        markAround(light.position_m + d * stop_m, std::max(0.5f * grid_.cellSize(), spread * stop_m), marks);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)
@@ -97,24 +92,15 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
 }
 
 void LightGrid::markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const {
-    const glm::uvec3 low = coordinates(point - reach_m), high = coordinates(point + reach_m);
+    const glm::uvec3 low = grid_.coordinates(point - reach_m), high = grid_.coordinates(point + reach_m);
     for (uint32_t z = low.z; z <= high.z; ++z)
         for (uint32_t y = low.y; y <= high.y; ++y)
-            for (uint32_t x = low.x; x <= high.x; ++x) marks[(z * size_.y + y) * size_.x + x] = 1;
-}
-
-glm::uvec3 LightGrid::coordinates(glm::vec3 point) const {
-    return glm::clamp((point - origin_) / cell_m_, glm::vec3(0), glm::vec3(size_) - 0.5f);
-}
-
-uint32_t LightGrid::cellAt(glm::vec3 point) const {
-    const glm::uvec3 c = coordinates(point);
-    return (c.z * size_.y + c.y) * size_.x + c.x;
+            for (uint32_t x = low.x; x <= high.x; ++x) marks[grid_.index({x, y, z})] = 1;
 }
 
 std::span<const uint32_t> LightGrid::listed(glm::vec3 point) const {
     if (first_.empty()) return {};
-    const uint32_t cell = cellAt(point);
+    const uint32_t cell = grid_.at(point);
     return {lights_.data() + first_[cell], first_[cell + 1] - first_[cell]};
 }
 

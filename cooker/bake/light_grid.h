@@ -1,6 +1,7 @@
 // Which punctual lights are worth a shadow ray from where.
 #pragma once
 
+#include <bake/cell_grid.h>
 #include <trace/ray_scene.h>
 
 #include <cstdint>
@@ -35,17 +36,12 @@ class LightGrid {
     uint32_t identity(uint32_t light) const { return identity_[light]; }
 
    private:
-    size_t cellCount() const { return size_t{size_.x} * size_.y * size_.z; }
-    uint32_t cellAt(glm::vec3 point) const;
-    glm::uvec3 coordinates(glm::vec3 point) const;
     std::vector<uint32_t> reachedCells(const RayScene& rays, uint32_t light) const;
     void markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const;
 
     std::vector<uint32_t> identity_;  // per light
     std::vector<uint32_t> everywhere_;
-    glm::vec3 origin_{0};
-    float cell_m_ = 1;
-    glm::uvec3 size_{0};
+    CellGrid grid_;
     std::vector<uint64_t> first_;  // per cell and one more, into lights_; empty: no light is listed anywhere
     std::vector<uint32_t> lights_;
 };

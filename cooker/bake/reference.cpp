@@ -13,7 +13,6 @@ namespace dimmer::cook {
 namespace {
 
 constexpr float start_offset_m = 2e-4f;
-constexpr float far_m = 1e30f;
 // Roulette ends paths; the limit is for nothing but a bound (0.99^4096, the largest reflectance's share, is 1e-18).
 constexpr int roulette_after = 3, vertices_max = 4096;
 // Shadow rays to lamps per vertex; with no more lamps than that, each gets its own.
@@ -158,7 +157,7 @@ glm::vec3 ReferenceTracer::fromLight(const Light& light, const Vertex& vertex) c
     const Illumination lit = illuminate(rays_.scene().lights[light.index], vertex.point);
     const float cos_surface = vertex.cosine(lit.towards_light);
     if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0)) return glm::vec3(0);
-    const float distance = std::isinf(lit.distance_m) ? far_m : lit.distance_m;
+    const float distance = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
     return light.weight * lit.irradiance_lux *
            (cos_surface * rays_.transmittance(vertex.point, lit.towards_light, distance));
 }
@@ -217,7 +216,7 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     weigh(lamp_sources_, vertex.point, path.weights);
     const uint32_t lamp = pick(path.weights, path.next() * vertex.lamp_weight_sum);
     const PunctualLight& light = rays_.scene().lights[lamps_[lamp].index];
-    const auto hit = rays_.nearest(light.position_m, lampDirection(light, path.next2()), far_m, path.nextBits());
+    const auto hit = rays_.nearest(light.position_m, lampDirection(light, path.next2()), far_away_m, path.nextBits());
     const auto lit = hit ? vertexAt(*hit) : std::nullopt;
     if (!lit) return glm::vec3(0);
     const glm::vec3 to_lit = lit->point - vertex.point;
@@ -301,7 +300,7 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         const glm::vec3 d = cosineDirection(path.next2());
         const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
         if (!(vertex.cosine(direction) > 0)) return sum;
-        const auto hit = rays_.nearest(vertex.point, direction, far_m, path.nextBits());
+        const auto hit = rays_.nearest(vertex.point, direction, far_away_m, path.nextBits());
         if (!hit) return sum + throughput * skyRadiance(scene, direction) * options_.always_weight;
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
         if (hit->back && !scene.materials[triangle.material].double_sided) return sum;

@@ -11,7 +11,7 @@ namespace {
 constexpr int rounds_max = 8;
 constexpr float moment_max = 9.9f;  // of the format's 9.98
 // Keeps the normal equations solvable where the model is clamped on most of the normals.
-constexpr float damping = 1e-4f;
+constexpr float ridge = 1e-4f;
 
 using Parameters = glm::vec3;  // r, b_x, b_y
 
@@ -50,7 +50,7 @@ float residual(const Parameters& p, glm::vec4 target, DirectionModel model) {
 Parameters refine(Parameters p, glm::vec4 target, DirectionModel model, float& best) {
     best = residual(p, target, model);
     for (int round = 0; round < rounds_max; ++round) {
-        glm::mat3 normal(damping);
+        glm::mat3 normal(ridge);
         glm::vec3 gradient(0);
         for (int i = 0; i < 4; ++i) {
             const Falloff f = falloff(p, tilted_normals[static_cast<size_t>(i)], model);

@@ -79,7 +79,7 @@ class TransferTracer {
             const Start start = startAt(around, m.positions_m[vertex], i, seed);
             const glm::vec3 up = start.normal * (back ? -1.0f : 1.0f);
             if (!(glm::dot(direction, up) > 0)) continue;  // a smooth normal's lobe dips below its triangles
-            const auto hit = rays_.nearest(start.position_m + lift_m_ * up, direction, 1e30f, hash(seed, i));
+            const auto hit = rays_.nearest(start.position_m + lift_m_ * up, direction, far_away_m, hash(seed, i));
             if (!hit) continue;
             const glm::vec3 inside = model_from_world_ * direction;
             const auto y = sphericalHarmonics({inside.x, inside.y, inside.z});

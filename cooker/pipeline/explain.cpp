@@ -115,7 +115,7 @@ uint32_t texelCoordinate(float uv, uint32_t size) {
 }
 
 double luminanceOf(const std::array<float, 3>& lux) {
-    return static_cast<double>(luminance(lux[0], lux[1], lux[2]));
+    return static_cast<double>(dimmer::luminance(lux[0], lux[1], lux[2]));
 }
 
 void fillShares(Explanation& e) {

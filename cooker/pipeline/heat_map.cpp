@@ -54,7 +54,8 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
         Picture picture{static_cast<int>(pack.pageWidth()), static_cast<int>(pack.pageHeight()), {}};
         for (uint32_t texel : runtime.irradiancePages().subspan(page * texels, texels)) {
             const auto [r, g, b] = decodeColor(pack.colorFormat(), texel);
-            picture.rgb.insert(picture.rgb.end(), 3, grey(static_cast<double>(luminance(r, g, b) / pack.exposure())));
+            picture.rgb.insert(picture.rgb.end(), 3,
+                               grey(static_cast<double>(dimmer::luminance(r, g, b) / pack.exposure())));
         }
         const int radius = std::max(1, picture.width / 256);
         for (size_t i = 0; i < report.points.size(); ++i) {

@@ -15,7 +15,7 @@
 namespace dimmer::cook {
 namespace {
 
-std::array<float, 3> array(glm::vec3 v) {
+std::array<float, 3> toArray(glm::vec3 v) {
     return {v.x, v.y, v.z};
 }
 
@@ -108,11 +108,11 @@ class ModelMeshes {
         }
         ModelMesh mesh;
         mesh.name = model.node;
-        mesh.min_m = array(low);
-        mesh.max_m = array(high);
-        mesh.reflectance = array(meanReflectance(scene_, material));
+        mesh.min_m = toArray(low);
+        mesh.max_m = toArray(high);
+        mesh.reflectance = toArray(meanReflectance(scene_, material));
         const glm::vec3 emission = emission_cd_m2_.empty() ? material.emission_cd_m2 : emission_cd_m2_[key.first];
-        mesh.emission_cd_m2 = array(emission);
+        mesh.emission_cd_m2 = toArray(emission);
         if (emission != glm::vec3(0)) mesh.emission_set = key.second;
         for (size_t i = 0; i < positions.size(); ++i)
             mesh.vertices.push_back(
@@ -186,8 +186,8 @@ void describeModels(const Scene& scene, std::span<const glm::vec3> emission_cd_m
             row = {model.world_from_model[0][r], model.world_from_model[1][r], model.world_from_model[2][r],
                    model.origin_m[r]};
         }
-        placed.min_m = array(model.min_m);
-        placed.max_m = array(model.max_m);
+        placed.min_m = toArray(model.min_m);
+        placed.max_m = toArray(model.max_m);
         pack.models.push_back(std::move(placed));
     }
 }

@@ -22,7 +22,7 @@ using nlohmann::json;
 constexpr int extends_depth_max = 8;
 constexpr const char* base_profile = "desktop";
 
-std::unexpected<Error> bad(const std::string& source, const std::string& text) {
+std::unexpected<Error> badProfile(const std::string& source, const std::string& text) {
     return fail(ErrorCode::BadInput, fmt::format("profile {}: {}", source, text));
 }
 
@@ -58,13 +58,13 @@ Expected<json> parseObject(const Source& source) {
     };
     try {
         json root = json::parse(source.text, shallow);
-        if (too_deep) return bad(source.name, "it nests deeper than any setting");
+        if (too_deep) return badProfile(source.name, "it nests deeper than any setting");
         if (root.is_object()) return root;
-        return bad(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
+        return badProfile(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
     } catch (const json::exception& error) {
         // "[json.exception.parse_error.101] parse error at line 1, column 2: ..."
         const std::string_view text = error.what();
-        return bad(source.name, fmt::format("this is not JSON: {}", text.substr(text.find("] ") + 2)));
+        return badProfile(source.name, fmt::format("this is not JSON: {}", text.substr(text.find("] ") + 2)));
     }
 }
 
@@ -92,10 +92,10 @@ Expected<void> apply(Profile& profile, const Source& source, int depth);
 Expected<void> applyBase(Profile& profile, const json& root, const Source& source, int depth) {
     if (!root.contains("extends") && source.name == base_profile) return {};
     const json extends = root.value("extends", json(base_profile));
-    if (!extends.is_string()) return bad(source.name, "'extends' must be a shipped profile's name or a file");
-    if (depth >= extends_depth_max) return bad(source.name, "profiles extend one another in a circle");
+    if (!extends.is_string()) return badProfile(source.name, "'extends' must be a shipped profile's name or a file");
+    if (depth >= extends_depth_max) return badProfile(source.name, "profiles extend one another in a circle");
     const auto base = findSource(extends.get<std::string>(), source.folder);
-    if (!base) return bad(source.name, "'extends': " + base.error().message);
+    if (!base) return badProfile(source.name, "'extends': " + base.error().message);
     return apply(profile, *base, depth + 1);
 }
 
@@ -166,7 +166,7 @@ Expected<CookSettings> readSettings(const std::string& settings_json) {
     const auto settings = settingsOf(out.profile);
     for (const auto& [key, setting] : root->items()) {
         if (!setting.is_object() || !setting.contains("value"))
-            return bad(source, fmt::format("'{}' has no value", key));
+            return badProfile(source, fmt::format("'{}' has no value", key));
         const json& value = setting["value"];
         if (key == "quality" && value.is_string()) out.quality = value.get<std::string>();
         const bool known = std::ranges::find(settings, key, &Setting::key) != settings.end();
@@ -175,7 +175,7 @@ Expected<CookSettings> readSettings(const std::string& settings_json) {
             return std::unexpected(ok.error());
     }
     if (!out.profile.quality(out.quality))
-        return bad(source, "no quality is named; the pack was not cooked from a level");
+        return badProfile(source, "no quality is named; the pack was not cooked from a level");
     return out;
 }
 

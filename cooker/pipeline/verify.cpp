@@ -105,11 +105,11 @@ bool reached(const ErrorFigures& f) {
 // Channels are rounded on their own; in luminance their errors partly cancel, which this does not count on.
 double formatError(std::span<const LightPair> pairs, const Pack& pack, double floor_lux) {
     const double exposure = static_cast<double>(pack.exposure());
-    const int mantissa_bits = pack.colorFormat() == ColorFormat::R11G11B10F ? 6 : 8;
+    const int channel_bits = pack.colorFormat() == ColorFormat::R11G11B10F ? 6 : 8;
     double sum = 0;
     for (const LightPair& p : pairs) {
         const double stored = std::max(p.value_lux * exposure, 0x1p-14);
-        const double step = std::exp2(std::floor(std::log2(stored)) - mantissa_bits);
+        const double step = std::exp2(std::floor(std::log2(stored)) - channel_bits);
         sum += 0.25 * step / exposure / (p.reference_lux + floor_lux);
     }
     return pairs.empty() ? 0 : sum / static_cast<double>(pairs.size());

@@ -10,11 +10,11 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t tries_per_point = 20;
+constexpr uint32_t tries_per_model_point = 20;
 constexpr float covered_m = 0.01f, behind_m = 1e-3f;
 constexpr int surfaces_max = 8;
 
-glm::vec3 vec(const std::array<float, 3>& a) {
+glm::vec3 toVec(const std::array<float, 3>& a) {
     return {a[0], a[1], a[2]};
 }
 
@@ -43,7 +43,7 @@ std::vector<ModelTriangle> standingTriangles(const Pack& pack) {
             for (size_t i = 0; i < mesh.indices.size(); i += 3) {
                 const std::array corner{mesh.indices[i], mesh.indices[i + 1], mesh.indices[i + 2]};
                 std::array<glm::vec3, 3> p;
-                for (size_t c = 0; c < 3; ++c) p[c] = vec(modelPosition(mesh, mesh.vertices[corner[c]]));
+                for (size_t c = 0; c < 3; ++c) p[c] = toVec(modelPosition(mesh, mesh.vertices[corner[c]]));
                 sum += 0.5 * static_cast<double>(glm::length(glm::cross(p[1] - p[0], p[2] - p[0])));
                 out.push_back({m, k, corner, sum});
             }
@@ -59,7 +59,7 @@ struct ModelPoint {
     LightTransfer shadowed, plain;
 };
 
-ModelPoint pointOn(const Pack& pack, const ModelTriangle& t, glm::vec2 u) {
+ModelPoint modelPointOn(const Pack& pack, const ModelTriangle& t, glm::vec2 u) {
     const PlacedModel& model = pack.models()[t.model];
     const ModelMesh& mesh = pack.modelMeshes()[t.mesh];
     const float root = std::sqrt(u.x);
@@ -70,9 +70,9 @@ ModelPoint pointOn(const Pack& pack, const ModelTriangle& t, glm::vec2 u) {
     glm::vec3 smooth(0);
     for (size_t c = 0; c < 3; ++c) {
         const ModelVertex& v = mesh.vertices[t.corner[c]];
-        p[c] = placed(model.world_from_model, vec(modelPosition(mesh, v)));
+        p[c] = placed(model.world_from_model, toVec(modelPosition(mesh, v)));
         out.position_m += weights[c] * p[c];
-        smooth += weights[c] * turned(model.world_from_model, vec(modelNormal(v)));
+        smooth += weights[c] * turned(model.world_from_model, toVec(modelNormal(v)));
         const LightTransfer transfer = modelTransfer(v, model.world_from_model);
         for (size_t k = 0; k < 9; ++k) out.shadowed.coefficients[k] += weights[c] * transfer.coefficients[k];
     }
@@ -98,12 +98,12 @@ std::vector<ModelPoint> chooseModelPoints(const Pack& pack, const RayScene& rays
     std::vector<ModelPoint> points;
     const auto triangles = standingTriangles(pack);
     if (triangles.empty()) return points;
-    for (uint32_t i = 0; points.size() < count && i < tries_per_point * count; ++i) {
+    for (uint32_t i = 0; points.size() < count && i < tries_per_model_point * count; ++i) {
         const glm::vec3 u = sequence3d(i, hash(seed, 0x30de1u));
         const double target = static_cast<double>(u.z) * triangles.back().cumulative_m2;
         auto t = std::ranges::upper_bound(triangles, target, {}, &ModelTriangle::cumulative_m2);
         if (t == triangles.end()) --t;
-        const ModelPoint p = pointOn(pack, *t, {u.x, u.y});
+        const ModelPoint p = modelPointOn(pack, *t, {u.x, u.y});
         TangentFrame frame{{}, {}, p.normal};
         orthonormalBasis(p.normal, frame.tangent, frame.bitangent);
         if (!covered(rays, pack.models()[t->model].node, p) && !hidden(rays, p.position_m, frame, hash(seed, i)))
@@ -126,7 +126,7 @@ Expected<ModelFigures> verifyModels(const ReferenceTracer& tracer, const RayScen
     std::vector<double> shadowed, plain;
     const auto lux = [&](const ModelPoint& p, const LightTransfer& transfer) {
         const auto e = grid.sampleTransfer(p.slot, {p.position_m.x, p.position_m.y, p.position_m.z}, transfer);
-        return static_cast<double>(luminance(vec(e)));
+        return static_cast<double>(luminance(toVec(e)));
     };
     for (const ModelPoint& p : points) {
         where.push_back({p.position_m, p.normal, p.normal});

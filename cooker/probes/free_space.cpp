@@ -14,7 +14,7 @@ bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored, float 
     uint32_t hits = 0, backs = 0;
     for (uint32_t i = 0; i < rays_per_test; ++i) {
         const glm::vec3 direction = uniformSphereDirection(sequence2d(i, 1));
-        const auto hit = rays.nearest(point_m, direction, 1e30f, i, Surfaces::All, ignored);
+        const auto hit = rays.nearest(point_m, direction, far_away_m, i, Surfaces::All, ignored);
         if (!hit) continue;
         if (hit->distance_m < clearance_m) return false;
         ++hits;

@@ -54,7 +54,7 @@ float medianLuminance(const Pack& pack, std::span<const uint32_t> pages) {
     std::vector<float> lit;
     for (const uint32_t texel : pages) {
         const auto [r, g, b] = decodeColor(pack.colorFormat(), texel);
-        if (const float l = luminance(r, g, b); l > 0) lit.push_back(l);
+        if (const float l = dimmer::luminance(r, g, b); l > 0) lit.push_back(l);
     }
     if (lit.empty()) return 1;
     const auto middle = lit.begin() + static_cast<std::ptrdiff_t>(lit.size() / 2);
@@ -77,7 +77,7 @@ std::vector<float> regionOf(const PackData& d, uint32_t element) {
                 const TexelRecord& record = d.payload[d.terms[t].first_record + i];
                 const auto [r, g, b] = decodeColor(d.color_format, canonical(d.color_format, record).irradiance);
                 float& sum = light[cluster.first_receiver + i];
-                sum = std::max(sum, 0.0f) + luminance(r, g, b);
+                sum = std::max(sum, 0.0f) + dimmer::luminance(r, g, b);
             }
         }
     return light;

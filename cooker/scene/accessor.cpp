@@ -9,7 +9,7 @@ namespace dimmer::cook {
 namespace {
 
 // `count` elements of equal size, `stride_bytes` apart, all inside their buffer.
-struct Elements {
+struct StridedElements {
     const unsigned char* data = nullptr;
     size_t count = 0;
     size_t stride_bytes = 0;
@@ -17,8 +17,8 @@ struct Elements {
     const unsigned char* operator[](size_t i) const { return data + i * stride_bytes; }
 };
 
-Expected<Elements> locate(const ImportContext& context, int view_index, size_t offset, size_t count, size_t size,
-                          const std::string& owner) {
+Expected<StridedElements> locate(const ImportContext& context, int view_index, size_t offset, size_t count, size_t size,
+                                 const std::string& owner) {
     const auto& views = context.model.bufferViews;
     if (view_index < 0 || static_cast<size_t>(view_index) >= views.size())
         return context.error(
@@ -38,7 +38,7 @@ Expected<Elements> locate(const ImportContext& context, int view_index, size_t o
                                                 "bytes. Export the level again.",
                                                 count, size, offset, view.byteLength));
     const auto& bytes = context.model.buffers[static_cast<size_t>(view.buffer)].data;
-    return Elements{bytes.data() + view.byteOffset + offset, count, stride};
+    return StridedElements{bytes.data() + view.byteOffset + offset, count, stride};
 }
 
 template <class T>

@@ -45,9 +45,9 @@ Expected<Image> decodeRadiance(std::span<const unsigned char> bytes, const std::
 }
 
 // OpenEXR reads from streams of its own kind.
-class MemoryStream : public Imf::IStream {
+class MemoryInput : public Imf::IStream {
    public:
-    MemoryStream(std::span<const unsigned char> bytes, const std::string& file)
+    MemoryInput(std::span<const unsigned char> bytes, const std::string& file)
         : Imf::IStream(file.c_str()), bytes_(bytes) {}
     bool read(char to[], int count) override {
         if (count < 0 || static_cast<size_t>(count) > bytes_.size() - at_)
@@ -68,7 +68,7 @@ Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::s
     try {
         // A hostile header must not make the library reserve a table of four billion rows.
         Imf::Header::setMaxImageSize(exr_side_max, exr_side_max);
-        MemoryStream stream(bytes, file);
+        MemoryInput stream(bytes, file);
         Imf::InputFile input(stream, 0);
         const Imath::Box2i window = input.header().dataWindow();
         for (const char* name : {"R", "G", "B"})

@@ -18,6 +18,9 @@ inline constexpr uint32_t no_condition = UINT32_MAX;
 // Of Scene::models. Rays for a model's probes pass through the model itself.
 inline constexpr uint32_t no_model = UINT32_MAX;
 
+// Beyond every level: how far a ray goes that nothing stops.
+inline constexpr float far_away_m = 1e30f;
+
 // A triangle of the level in the one order that all stages share: meshes in scene order, then triangles.
 struct LevelTriangle {
     uint32_t mesh = 0;

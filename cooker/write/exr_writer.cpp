@@ -15,9 +15,9 @@ namespace dimmer::cook {
 namespace {
 
 // OpenEXR writes to streams of its own kind.
-class MemoryStream : public Imf::OStream {
+class MemoryOutput : public Imf::OStream {
    public:
-    MemoryStream() : Imf::OStream("memory") {}
+    MemoryOutput() : Imf::OStream("memory") {}
     void write(const char from[], int count) override {
         const auto size = static_cast<size_t>(count);
         if (at_ + size > bytes_.size()) bytes_.resize(at_ + size);
@@ -33,7 +33,7 @@ class MemoryStream : public Imf::OStream {
     size_t at_ = 0;
 };
 
-void write(const ExrPicture& picture, MemoryStream& stream) {
+void write(const ExrPicture& picture, MemoryOutput& stream) {
     const Imath::V2i first(static_cast<int>(picture.x), static_cast<int>(picture.y));
     const Imath::V2i size(static_cast<int>(picture.window_width), static_cast<int>(picture.window_height));
     const Imath::V2i whole(static_cast<int>(picture.width), static_cast<int>(picture.height));
@@ -58,7 +58,7 @@ void write(const ExrPicture& picture, MemoryStream& stream) {
 
 Expected<std::vector<std::byte>> exrBytes(const ExrPicture& picture) {
     try {
-        MemoryStream stream;
+        MemoryOutput stream;
         write(picture, stream);
         return stream.take();
     } catch (const std::bad_alloc&) {

@@ -8,14 +8,15 @@
 #include <optional>
 
 namespace dimmer {
-namespace {
-
-constexpr const char* validation_layer = "VK_LAYER_KHRONOS_validation";
 
 struct MessageLog {
     std::mutex mutex;
     std::vector<std::string> messages;
 };
+
+namespace {
+
+constexpr const char* validation_layer = "VK_LAYER_KHRONOS_validation";
 
 VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                          const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {

@@ -13,19 +13,12 @@ namespace dimmer {
 namespace {
 
 constexpr VkFormat word_format = VK_FORMAT_R32_UINT, record_format = VK_FORMAT_R32G32_UINT,
-                   index_format = VK_FORMAT_R16_UINT, wide_format = VK_FORMAT_R32G32B32A32_UINT;
-constexpr uint32_t workgroup_size = 64;
+                   index_format = VK_FORMAT_R16_UINT;
 
 VkPhysicalDeviceLimits limitsOf(const VulkanContext& vulkan) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     return properties.limits;
-}
-
-Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
-    if (!made) return std::unexpected(std::move(made.error()));
-    slot = std::move(*made);
-    return {};
 }
 
 std::vector<TexelRecord> baseRecords(const PackData& data) {

@@ -13,14 +13,6 @@ namespace {
 
 constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 
-void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written, VkPipelineStageFlags to,
-             VkAccessFlags used) {
-    auto info = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-    info.srcAccessMask = written;
-    info.dstAccessMask = used;
-    vkCmdPipelineBarrier(commands, from, to, 0, 1, &info, 0, nullptr, 0, nullptr);
-}
-
 }  // namespace
 
 Expected<ProbeAtlas> ProbeAtlas::create(const VulkanContext& vulkan, const PackData& data, uint32_t moving_probes,
@@ -60,17 +52,17 @@ uint64_t ProbeAtlas::deviceBytes() const {
 }
 
 void ProbeAtlas::beginWrites(VkCommandBuffer commands, VkPipelineStageFlags readers) {
-    barrier(commands, readers | compute, VK_ACCESS_SHADER_WRITE_BIT, compute,
-            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    memoryBarrier(commands, readers | compute, VK_ACCESS_SHADER_WRITE_BIT, compute,
+                  VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
 }
 
 void ProbeAtlas::betweenWrites(VkCommandBuffer commands) {
-    barrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, compute, VK_ACCESS_SHADER_READ_BIT);
+    memoryBarrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, compute, VK_ACCESS_SHADER_READ_BIT);
 }
 
 void ProbeAtlas::endWrites(VkCommandBuffer commands, VkPipelineStageFlags readers) {
-    barrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, readers | VK_PIPELINE_STAGE_TRANSFER_BIT,
-            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT);
+    memoryBarrier(commands, compute, VK_ACCESS_SHADER_WRITE_BIT, readers | VK_PIPELINE_STAGE_TRANSFER_BIT,
+                  VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT);
 }
 
 Expected<std::vector<uint32_t>> ProbeAtlas::read(uint32_t set, Transfer& readback) const {
@@ -81,8 +73,8 @@ Expected<std::vector<uint32_t>> ProbeAtlas::read(uint32_t set, Transfer& readbac
             .srcOffset = offset, .dstOffset = 0, .size = std::min(Transfer::staging_bytes, bytes - offset)};
         DIMMER_TRY(readback.run([&](VkCommandBuffer commands) {
             vkCmdCopyBuffer(commands, buffer(set), readback.staging().buffer.get(), 1, &region);
-            barrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, VK_PIPELINE_STAGE_HOST_BIT,
-                    VK_ACCESS_HOST_READ_BIT);
+            memoryBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+                          VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);
         }));
         std::memcpy(reinterpret_cast<std::byte*>(words.data()) + offset, readback.staging().mapped, region.size);
     }

@@ -11,18 +11,7 @@
 namespace dimmer {
 namespace {
 
-constexpr VkFormat wide_format = VK_FORMAT_R32G32B32A32_UINT;
-constexpr uint32_t workgroup_size = 64, lanes_per_item = 16, items_per_workgroup = workgroup_size / lanes_per_item;
-
-struct DispatchConstants {
-    uint32_t first_item, item_count;
-};
-
-Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
-    if (!made) return std::unexpected(std::move(made.error()));
-    slot = std::move(*made);
-    return {};
-}
+constexpr uint32_t lanes_per_probe_item = 16, probe_items_per_workgroup = workgroup_size / lanes_per_probe_item;
 
 // What the device reads as record i: the base of every receiver first, then the contributions.
 ProbeRecord recordAt(const PackData& data, uint32_t i) {
@@ -112,7 +101,7 @@ Expected<void> ProbeBlender::createKernel(VkDevice device, ColorFormat format, c
         for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
         bindings.push_back(KernelBinding::ofBuffer(atlas.buffer(i)));
     }
-    auto kernel = Kernel::create(device, spirv::blend_probes_comp, bindings, sizeof(DispatchConstants), pipelines,
+    auto kernel = Kernel::create(device, spirv::blend_probes_comp, bindings, sizeof(DispatchedItems), pipelines,
                                  static_cast<uint32_t>(sets_.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
@@ -134,8 +123,9 @@ uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner
         const WorkGroup& group = planner.work().groups[i];
         if (group.item_count == 0) continue;
         kernel_.bind(commands, i, set);
-        kernel_.push(commands, DispatchConstants{group.first_item, group.item_count});
-        dispatchRows(commands, (group.item_count + items_per_workgroup - 1) / items_per_workgroup, groups_x_max_);
+        kernel_.push(commands, DispatchedItems{group.first_item, group.item_count});
+        dispatchRows(commands, (group.item_count + probe_items_per_workgroup - 1) / probe_items_per_workgroup,
+                     groups_x_max_);
         ++dispatches;
     }
     return dispatches;

@@ -11,7 +11,7 @@
 namespace dimmer {
 namespace {
 
-struct DispatchConstants {
+struct ResampledItems {
     uint32_t item_count, first_moving;
 };
 
@@ -66,7 +66,7 @@ Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, con
         resampler.sets_.push_back({std::move(*items), 0});
     }
     const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
-    auto kernel = Kernel::create(vulkan.device, spirv::resample_probes_comp, bindings, sizeof(DispatchConstants),
+    auto kernel = Kernel::create(vulkan.device, spirv::resample_probes_comp, bindings, sizeof(ResampledItems),
                                  pipelines, atlas.setCount());
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     resampler.kernel_ = std::move(*kernel);
@@ -80,7 +80,7 @@ void ProbeResampler::write(std::span<const ResampleItem> items, uint32_t set) {
 
 void ProbeResampler::dispatch(VkCommandBuffer commands, uint32_t set) const {
     kernel_.bind(commands, 0, set);
-    kernel_.push(commands, DispatchConstants{sets_[set].item_count, first_moving_});
+    kernel_.push(commands, ResampledItems{sets_[set].item_count, first_moving_});
     dispatchRows(commands, sets_[set].item_count, groups_x_max_);
 }
 

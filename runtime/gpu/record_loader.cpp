@@ -10,15 +10,6 @@ namespace {
 
 constexpr VkDeviceSize staging_bytes = 4 << 20;
 
-// What updates read there before, may be overwritten; what they read later, is what was copied.
-void barrier(VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written, VkPipelineStageFlags to,
-             VkAccessFlags read) {
-    auto info = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-    info.srcAccessMask = written;
-    info.dstAccessMask = read;
-    vkCmdPipelineBarrier(commands, from, to, 0, 1, &info, 0, nullptr, 0, nullptr);
-}
-
 }  // namespace
 
 RecordLoader::RecordLoader(const VulkanContext& vulkan, VkQueue queue, uint32_t queue_family)
@@ -107,11 +98,11 @@ Expected<void> RecordLoader::send(const RecordStore& store, Load& load, uint64_t
     DIMMER_VK(vkBeginCommandBuffer, commands_.commands, &begin);
     constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
                                    copy = VK_PIPELINE_STAGE_TRANSFER_BIT;
-    barrier(commands_.commands, compute | copy, VK_ACCESS_TRANSFER_WRITE_BIT, copy, VK_ACCESS_TRANSFER_WRITE_BIT);
+    memoryBarrier(commands_.commands, compute | copy, VK_ACCESS_TRANSFER_WRITE_BIT, copy, VK_ACCESS_TRANSFER_WRITE_BIT);
     const VkBufferCopy region{
         .srcOffset = 0, .dstOffset = store.firstByte(load.contribution) + load.next_byte, .size = bytes};
     vkCmdCopyBuffer(commands_.commands, staging_.buffer.get(), store.buffer(), 1, &region);
-    barrier(commands_.commands, copy, VK_ACCESS_TRANSFER_WRITE_BIT, compute, VK_ACCESS_SHADER_READ_BIT);
+    memoryBarrier(commands_.commands, copy, VK_ACCESS_TRANSFER_WRITE_BIT, compute, VK_ACCESS_SHADER_READ_BIT);
     DIMMER_VK(vkEndCommandBuffer, commands_.commands);
     auto submit = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
     submit.commandBufferCount = 1;

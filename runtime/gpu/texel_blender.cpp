@@ -11,20 +11,14 @@
 namespace dimmer {
 namespace {
 
-// To a texel of a table: two records, or a term; two receivers' places; a work item.
-constexpr VkFormat wide_format = VK_FORMAT_R32G32B32A32_UINT, places_format = VK_FORMAT_R8G8_UINT,
-                   item_format = VK_FORMAT_R32G32_UINT;
+// To a texel of a table: two receivers' places; a work item. Two records, or a term: wide_format.
+constexpr VkFormat places_format = VK_FORMAT_R8G8_UINT, item_format = VK_FORMAT_R32G32_UINT;
 constexpr VkDeviceSize wide_bytes = 16;
 
-// 64 suits GPUs; lavapipe is within 3 % of its best from 64 to 512.
-constexpr uint32_t workgroup_size = 64, lanes_per_item = 8, items_per_workgroup = workgroup_size / lanes_per_item;
+constexpr uint32_t lanes_per_texel_item = 8, texel_items_per_workgroup = workgroup_size / lanes_per_texel_item;
 
 // Of a TexelItem.
 constexpr uint32_t item_index_bits = 26, item_count_bits = 12;
-
-struct DispatchConstants {
-    uint32_t first_item, item_count;
-};
 
 Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places, const Planner& planner) {
     const uint64_t payload_bytes = places.records * sizeof(TexelRecord);
@@ -57,12 +51,6 @@ std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) 
 Specialisation specialisationOf(uint32_t group, ColorFormat format) {
     return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
             static_cast<uint32_t>(format)};
-}
-
-Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
-    if (!made) return std::unexpected(std::move(made.error()));
-    slot = std::move(*made);
-    return {};
 }
 
 }  // namespace
@@ -138,7 +126,7 @@ Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, c
                                             KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
                                             KernelBinding::ofImage(page_sets[i].directionStorageView()),
                                         });
-    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchConstants), pipelines,
+    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchedItems), pipelines,
                                  static_cast<uint32_t>(page_sets.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
@@ -164,8 +152,8 @@ void TexelBlender::write(const Planner& planner, uint32_t page_set) {
 }
 
 void TexelBlender::recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const {
-    kernel_.push(commands, DispatchConstants{first_item, item_count});
-    dispatchRows(commands, (item_count + items_per_workgroup - 1) / items_per_workgroup, groups_x_max_);
+    kernel_.push(commands, DispatchedItems{first_item, item_count});
+    dispatchRows(commands, (item_count + texel_items_per_workgroup - 1) / texel_items_per_workgroup, groups_x_max_);
 }
 
 uint32_t TexelBlender::dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const {

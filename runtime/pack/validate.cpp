@@ -11,7 +11,7 @@ namespace dimmer {
 namespace {
 
 template <class... Args>
-std::unexpected<Error> bad(fmt::format_string<Args...> text, Args&&... args) {
+std::unexpected<Error> unusable(fmt::format_string<Args...> text, Args&&... args) {
     return fail(ErrorCode::BadInput,
                 "the pack is not usable: " + fmt::format(text, std::forward<Args>(args)...) + "; cook it again");
 }
@@ -23,16 +23,16 @@ bool finite(std::span<const float> values) {
 Expected<void> validatePages(const PackData& d) {
     if (d.page_count == 0 || d.page_count > page_count_max || d.page_width == 0 || d.page_width > page_side_max ||
         d.page_height == 0 || d.page_height > page_side_max)
-        return bad("{} pages of {} x {} texels are outside 1..{} pages of 1..{} a side", d.page_count, d.page_width,
-                   d.page_height, page_count_max, page_side_max);
+        return unusable("{} pages of {} x {} texels are outside 1..{} pages of 1..{} a side", d.page_count,
+                        d.page_width, d.page_height, page_count_max, page_side_max);
     const uint64_t texels = uint64_t{d.page_count} * d.page_width * d.page_height;
     if (d.base_pages.size() != texels)
-        return bad("its base holds {} texels, its pages {}", d.base_pages.size(), texels);
+        return unusable("its base holds {} texels, its pages {}", d.base_pages.size(), texels);
     if (d.color_format != ColorFormat::R11G11B10F && d.color_format != ColorFormat::E5B9G9R9)
-        return bad("its colour format {} is unknown", static_cast<uint32_t>(d.color_format));
+        return unusable("its colour format {} is unknown", static_cast<uint32_t>(d.color_format));
     if (d.direction_model != DirectionModel::Ahd && d.direction_model != DirectionModel::Linear)
-        return bad("its directional model {} is unknown", static_cast<uint32_t>(d.direction_model));
-    if (!std::isfinite(d.exposure) || d.exposure <= 0) return bad("its exposure is {}", d.exposure);
+        return unusable("its directional model {} is unknown", static_cast<uint32_t>(d.direction_model));
+    if (!std::isfinite(d.exposure) || d.exposure <= 0) return unusable("its exposure is {}", d.exposure);
     return {};
 }
 
@@ -41,13 +41,13 @@ Expected<void> validateElements(const PackData& d) {
     bool doors = false;
     for (const Element& e : d.elements) {
         if (e.kind != ElementKind::LightSet && e.kind != ElementKind::Door)
-            return bad("element '{}' is of an unknown kind", e.name);
+            return unusable("element '{}' is of an unknown kind", e.name);
         if (e.kind == ElementKind::Door) doors = true;
-        if (doors && e.kind == ElementKind::LightSet) return bad("light set '{}' stands behind a door", e.name);
+        if (doors && e.kind == ElementKind::LightSet) return unusable("light set '{}' stands behind a door", e.name);
         if (e.name.empty() || !names.emplace(e.kind, e.name).second)
-            return bad("the element name '{}' is empty or used twice", e.name);
+            return unusable("the element name '{}' is empty or used twice", e.name);
         if (!std::isfinite(e.max_weight) || e.max_weight <= 0)
-            return bad("element '{}' has a largest weight of {}", e.name, e.max_weight);
+            return unusable("element '{}' has a largest weight of {}", e.name, e.max_weight);
     }
     return {};
 }
@@ -59,15 +59,16 @@ Expected<void> validateContributions(const PackData& d) {
     uint64_t records = 0;
     for (size_t k = 0; k < d.contributions.size(); ++k) {
         const Contribution& c = d.contributions[k];
-        if (c.light_set && !is(*c.light_set, ElementKind::LightSet)) return bad("contribution {} has no such set", k);
+        if (c.light_set && !is(*c.light_set, ElementKind::LightSet))
+            return unusable("contribution {} has no such set", k);
         for (const auto* doors : {&c.doors_open, &c.doors_closed})
             for (uint32_t door : *doors)
-                if (!is(door, ElementKind::Door)) return bad("contribution {} has no such door", k);
-        if (!std::isfinite(c.energy_dropped)) return bad("contribution {} dropped {} energy", k, c.energy_dropped);
+                if (!is(door, ElementKind::Door)) return unusable("contribution {} has no such door", k);
+        if (!std::isfinite(c.energy_dropped)) return unusable("contribution {} dropped {} energy", k, c.energy_dropped);
         records += c.receivers;
     }
     if (records != d.payload.size())
-        return bad("its contributions list {} records, its payload holds {}", records, d.payload.size());
+        return unusable("its contributions list {} records, its payload holds {}", records, d.payload.size());
     return {};
 }
 
@@ -92,16 +93,17 @@ Expected<void> validateTerms(const Kind& kind) {
         const Cluster& c = kind.view.clusters[i];
         for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) {
             const ClusterTerm& term = terms[t];
-            if (term.contribution >= next.size()) return bad("cluster {} names contribution {}", i, term.contribution);
+            if (term.contribution >= next.size())
+                return unusable("cluster {} names contribution {}", i, term.contribution);
             if (t > c.first_term && terms[t - 1].contribution >= term.contribution)
-                return bad("the contributions of cluster {} are out of order", i);
-            if (term.first_record != next[term.contribution]) return bad("cluster {} misplaces its records", i);
+                return unusable("the contributions of cluster {} are out of order", i);
+            if (term.first_record != next[term.contribution]) return unusable("cluster {} misplaces its records", i);
             next[term.contribution] += c.receiver_count;
             if (next[term.contribution] > ends[term.contribution])
-                return bad("cluster {} reads past contribution {}", i, term.contribution);
+                return unusable("cluster {} reads past contribution {}", i, term.contribution);
         }
     }
-    if (next != ends) return bad("some records belong to no cluster");
+    if (next != ends) return unusable("some records belong to no cluster");
     return {};
 }
 
@@ -111,23 +113,23 @@ Expected<void> validateClusters(const Kind& kind) {
     for (size_t i = 0; i < kind.view.clusters.size(); ++i) {
         const Cluster& c = kind.view.clusters[i];
         if (c.first_receiver != receiver || c.first_batch != batch || c.first_term != term || c.receiver_count == 0)
-            return bad("cluster {} does not follow the one before it", i);
+            return unusable("cluster {} does not follow the one before it", i);
         receiver += c.receiver_count;
         batch += c.batch_count;
         term += c.term_count;
         if (receiver > kind.receivers || batch > batches.size() || term > kind.view.terms.size())
-            return bad("cluster {} reaches past the tables", i);
+            return unusable("cluster {} reaches past the tables", i);
         uint64_t covered = c.first_receiver;
         for (uint64_t b = c.first_batch; b < batch; ++b) {
             const Batch& item = batches[b];
             if (item.first_receiver != covered || item.receiver_count == 0 || item.receiver_count > batch_receivers_max)
-                return bad("batch {} does not follow the one before it", b);
+                return unusable("batch {} does not follow the one before it", b);
             covered += item.receiver_count;
         }
-        if (covered != receiver) return bad("the batches of cluster {} do not cover it", i);
+        if (covered != receiver) return unusable("the batches of cluster {} do not cover it", i);
     }
     if (receiver != kind.receivers || batch != batches.size() || term != kind.view.terms.size())
-        return bad("its clusters do not cover its tables");
+        return unusable("its clusters do not cover its tables");
     return {};
 }
 
@@ -139,9 +141,9 @@ Expected<void> validateBatchTiles(const PackData& d) {
             BatchTiles tiles;
             for (uint32_t i = 0; i < batch.receiver_count; ++i)
                 if (!tiles.add(d.addresses[batch.first_receiver + i]))
-                    return bad("batch {} lies in more than {} tiles of one page", b, batch_tiles_max);
+                    return unusable("batch {} lies in more than {} tiles of one page", b, batch_tiles_max);
             if (batch.receiver_count % 2 != 0 && b + 1 < c.first_batch + c.batch_count)
-                return bad("batch {} has an odd number of receivers and is not its cluster's last", b);
+                return unusable("batch {} has an odd number of receivers and is not its cluster's last", b);
         }
     return {};
 }
@@ -158,16 +160,16 @@ Expected<void> validateProbes(const PackData& d) {
     if (p.base.empty() && p.numbers.empty() && p.payload.empty() && p.clusters.empty() && p.record_counts.empty())
         return {};
     if (p.record_counts.size() != d.contributions.size())
-        return bad("it counts the probes' records of {} contributions, not {}", p.record_counts.size(),
-                   d.contributions.size());
+        return unusable("it counts the probes' records of {} contributions, not {}", p.record_counts.size(),
+                        d.contributions.size());
     const Kind kind{p.view(), p.numbers.size(), {p.record_counts.begin(), p.record_counts.end()}};
     const uint64_t records = std::accumulate(kind.record_counts.begin(), kind.record_counts.end(), uint64_t{0});
     if (records != p.payload.size())
-        return bad("its contributions list {} records of probes, the payload holds {}", records, p.payload.size());
+        return unusable("its contributions list {} records of probes, the payload holds {}", records, p.payload.size());
     std::vector<bool> taken(p.base.size());
     for (const uint32_t number : p.numbers) {
         if (number >= p.base.size() || taken[number])
-            return bad("a receiver is probe {} of {}, or two are", number, p.base.size());
+            return unusable("a receiver is probe {} of {}, or two are", number, p.base.size());
         taken[number] = true;
     }
     if (auto ok = validateClusters(kind); !ok) return ok;
@@ -177,17 +179,17 @@ Expected<void> validateProbes(const PackData& d) {
 Expected<void> validateTetrahedra(const GlobalGrid& grid) {
     const size_t probes = grid.positions.size(), count = grid.tetrahedra.size();
     if (!grid.visibility.empty() && grid.visibility.size() != count)
-        return bad("its visibility is of {} tetrahedra, not {}", grid.visibility.size(), count);
+        return unusable("its visibility is of {} tetrahedra, not {}", grid.visibility.size(), count);
     for (size_t i = 0; i < count; ++i) {
         const Tetrahedron& t = grid.tetrahedra[i];
         for (const uint32_t probe : t.probes)
-            if (probe >= probes) return bad("tetrahedron {} has probe {} of {}", i, probe, probes);
+            if (probe >= probes) return unusable("tetrahedron {} has probe {} of {}", i, probe, probes);
         for (const uint32_t neighbour : t.neighbours)
             if (neighbour >= count && neighbour != no_tetrahedron)
-                return bad("tetrahedron {} has neighbour {} of {}", i, neighbour, count);
+                return unusable("tetrahedron {} has neighbour {} of {}", i, neighbour, count);
     }
     for (const uint32_t start : grid.starts)
-        if (start >= count) return bad("a walk starts in tetrahedron {} of {}", start, count);
+        if (start >= count) return unusable("a walk starts in tetrahedron {} of {}", start, count);
     return {};
 }
 
@@ -195,36 +197,36 @@ Expected<void> validateTetrahedra(const GlobalGrid& grid) {
 Expected<void> validateGlobalGrid(const PackData& d) {
     const GlobalGrid& grid = d.probes.global;
     if (grid.positions.size() > d.probes.base.size() || grid.levels.size() != grid.positions.size())
-        return bad("its global grid has {} places and {} levels for {} probes", grid.positions.size(),
-                   grid.levels.size(), d.probes.base.size());
+        return unusable("its global grid has {} places and {} levels for {} probes", grid.positions.size(),
+                        grid.levels.size(), d.probes.base.size());
     for (const ProbePosition& p : grid.positions)
         if (!std::isfinite(p.x_m) || !std::isfinite(p.y_m) || !std::isfinite(p.z_m))
-            return bad("a probe stands nowhere");
+            return unusable("a probe stands nowhere");
     const StartGrid& start = grid.start;
-    if (!finite(start.min_m) || !finite(start.max_m)) return bad("its global grid's box is not finite");
+    if (!finite(start.min_m) || !finite(start.max_m)) return unusable("its global grid's box is not finite");
     uint64_t cells = 1;
     for (size_t axis = 0; axis < 3; ++axis) {
-        if (!grid.empty() && !(start.min_m[axis] < start.max_m[axis])) return bad("its global grid's box is flat");
+        if (!grid.empty() && !(start.min_m[axis] < start.max_m[axis])) return unusable("its global grid's box is flat");
         // Each factor is at most the number of cells that are there, so that the product cannot overflow.
-        if (start.counts[axis] > grid.starts.size()) return bad("its starts of walks do not fill their box");
+        if (start.counts[axis] > grid.starts.size()) return unusable("its starts of walks do not fill their box");
         cells = std::min<uint64_t>(cells * start.counts[axis], UINT32_MAX);
     }
     if (grid.starts.size() != cells || (grid.empty() != grid.starts.empty()))
-        return bad("its starts of walks do not fill their box");
+        return unusable("its starts of walks do not fill their box");
     return validateTetrahedra(grid);
 }
 
 Expected<void> validateLocalGrids(const PackData& d) {
     for (const LocalGrid& grid : d.probes.local) {
         if (!std::ranges::all_of(grid.counts, [](uint32_t n) { return n >= 1 && n <= local_grid_side_max; }))
-            return bad("local grid '{}' has {} x {} x {} probes", grid.node, grid.counts[0], grid.counts[1],
-                       grid.counts[2]);
+            return unusable("local grid '{}' has {} x {} x {} probes", grid.node, grid.counts[0], grid.counts[1],
+                            grid.counts[2]);
         if (!finite(grid.origin_m) || !std::ranges::all_of(grid.step_m, [](const auto& s) { return finite(s); }))
-            return bad("local grid '{}' is not finite", grid.node);
+            return unusable("local grid '{}' is not finite", grid.node);
         const uint64_t first = d.probes.global.positions.size(), end = d.probes.base.size();
         if (grid.first_probe != no_probe &&
             (grid.first_probe < first || grid.first_probe > end || grid.probeCount() > end - grid.first_probe))
-            return bad("local grid '{}' has probes that are not there", grid.node);
+            return unusable("local grid '{}' has probes that are not there", grid.node);
     }
     return {};
 }
@@ -234,9 +236,9 @@ Expected<void> validateAddresses(const PackData& d) {
     for (uint32_t address : d.addresses) {
         const uint32_t page = TexelAddress::page(address), x = TexelAddress::x(address), y = TexelAddress::y(address);
         if (page >= d.page_count || x >= d.page_width || y >= d.page_height)
-            return bad("a receiver lies outside the pages, at page {} ({}, {})", page, x, y);
+            return unusable("a receiver lies outside the pages, at page {} ({}, {})", page, x, y);
         const size_t texel = (size_t{page} * d.page_height + y) * d.page_width + x;
-        if (taken[texel]) return bad("two receivers share the texel ({}, {}) of page {}", x, y, page);
+        if (taken[texel]) return unusable("two receivers share the texel ({}, {}) of page {}", x, y, page);
         taken[texel] = true;
     }
     return {};
@@ -247,20 +249,21 @@ Expected<void> validateMeshes(const PackData& d) {
         return !element || (*element < d.elements.size() && d.elements[*element].kind == kind);
     };
     for (const Mesh& m : d.meshes) {
-        if (m.page >= d.page_count) return bad("mesh '{}' lies on page {}", m.node, m.page);
+        if (m.page >= d.page_count) return unusable("mesh '{}' lies on page {}", m.node, m.page);
         if (!in(m.door, ElementKind::Door) || !in(m.emission_set, ElementKind::LightSet))
-            return bad("mesh '{}' belongs to no such element", m.node);
-        if (m.indices.size() % 3 != 0) return bad("mesh '{}' has a broken triangle", m.node);
+            return unusable("mesh '{}' belongs to no such element", m.node);
+        if (m.indices.size() % 3 != 0) return unusable("mesh '{}' has a broken triangle", m.node);
         if (!std::ranges::all_of(m.indices, [&](uint32_t i) { return i < m.vertices.size(); }))
-            return bad("mesh '{}' has an index past its vertices", m.node);
-        if (!finite(m.reflectance) || !finite(m.emission_cd_m2)) return bad("mesh '{}' has no finite colour", m.node);
+            return unusable("mesh '{}' has an index past its vertices", m.node);
+        if (!finite(m.reflectance) || !finite(m.emission_cd_m2))
+            return unusable("mesh '{}' has no finite colour", m.node);
         for (const MeshVertex& v : m.vertices)
             if (!finite(v.position_m) || !finite(v.normal) || !finite(v.lightmap_uv))
-                return bad("mesh '{}' has a vertex that is not finite", m.node);
+                return unusable("mesh '{}' has a vertex that is not finite", m.node);
     }
     for (const Viewpoint& v : d.viewpoints)
         if (!finite(v.position_m) || !finite(v.forward) || !std::isfinite(v.vertical_fov_rad))
-            return bad("viewpoint '{}' is not finite", v.name);
+            return unusable("viewpoint '{}' is not finite", v.name);
     return {};
 }
 

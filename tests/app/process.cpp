@@ -15,13 +15,6 @@
 namespace dimmer::test {
 namespace {
 
-std::string read(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
-}
-
 class Process {
    public:
     Process(const std::string& program, const std::vector<std::string>& arguments, const std::string& input) {
@@ -49,10 +42,10 @@ class Process {
     }
     bool running() { return started_ && !ended_ && !wait(WNOHANG); }
     void send(int signal) const { kill(id_, signal); }
-    std::string err() const { return read(err_); }
+    std::string err() const { return readText(err_); }
     ProcessResult result() {
         if (!started_ || (!ended_ && !wait(0))) return {};
-        return {WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_), read(out_), read(err_)};
+        return {WIFEXITED(status_) ? WEXITSTATUS(status_) : 128 + WTERMSIG(status_), readText(out_), readText(err_)};
     }
 
    private:
@@ -70,6 +63,13 @@ class Process {
 ProcessResult runProcess(const std::string& program, const std::vector<std::string>& arguments,
                          const std::string& input) {
     return Process(program, arguments, input).result();
+}
+
+std::string readText(const std::filesystem::path& path) {
+    std::ifstream file(path, std::ios::binary);
+    std::stringstream text;
+    text << file.rdbuf();
+    return text.str();
 }
 
 ProcessResult runInterrupted(const std::string& program, const std::vector<std::string>& arguments, int signal,

@@ -1,6 +1,7 @@
 // Runs a tool as a user's shell would.
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@ struct ProcessResult {
 // Waits for the end. `input` is what it reads on stdin.
 ProcessResult runProcess(const std::string& program, const std::vector<std::string>& arguments,
                          const std::string& input = "");
+
+// All bytes of a file; none of one that cannot be read.
+std::string readText(const std::filesystem::path& path);
 
 // Sends `signal` as soon as `when`, asked again and again with what stderr holds so far, says so.
 ProcessResult runInterrupted(const std::string& program, const std::vector<std::string>& arguments, int signal,

@@ -13,13 +13,6 @@ namespace dimmer::test {
 
 using cook::test::json;
 
-inline std::string readText(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
-}
-
 class ToolTest : public testing::Test {
    protected:
     static void SetUpTestSuite() {

@@ -8,8 +8,6 @@
 namespace dimmer::cook::test {
 namespace {
 
-constexpr double pi_d = std::numbers::pi;
-
 std::vector<QueryPoint> placesOn(const Scene& scene, int count) {
     const RayScene rays(scene);
     std::mt19937 random(7);

@@ -10,17 +10,10 @@
 namespace dimmer::cook::test {
 namespace {
 
-void addSolid(Scene& scene, const char* node, glm::vec3 low, glm::vec3 high, uint32_t material,
+// A solid between two corners.
+void addBlock(Scene& scene, const char* node, glm::vec3 low, glm::vec3 high, uint32_t material,
               std::optional<uint32_t> door = {}) {
-    const glm::vec3 half = 0.5f * (high - low), middle = 0.5f * (low + high);
-    for (int axis = 0; axis < 3; ++axis)
-        for (float side : {-1.0f, 1.0f}) {
-            glm::vec3 centre = middle, u(0), v(0);
-            centre[axis] += side * half[axis];
-            u[(axis + 1) % 3] = half[(axis + 1) % 3];
-            v[(axis + 2) % 3] = half[(axis + 2) % 3];
-            addQuad(scene, node, centre, side > 0 ? u : v, side > 0 ? v : u, material).door = door;
-        }
+    addSolid(scene, node, 0.5f * (low + high), 0.5f * (high - low), material, door);
 }
 
 // Two rooms of 8 m x 10 m, a doorway of 0.8 m x 2 m between them, a lamp on the -X side that shines through it onto the
@@ -29,11 +22,11 @@ Scene doorway() {
     Scene scene;
     const uint32_t white = addMaterial(scene, lambert(0.5f));
     addBox(scene, {8, 1.5f, 5}, white);
-    addSolid(scene, "wall_left", {-0.1f, -1.5f, -5}, {0.1f, 1.5f, -0.4f}, white);
-    addSolid(scene, "wall_right", {-0.1f, -1.5f, 0.4f}, {0.1f, 1.5f, 5}, white);
-    addSolid(scene, "lintel", {-0.1f, 0.5f, -0.4f}, {0.1f, 1.5f, 0.4f}, white);
+    addBlock(scene, "wall_left", {-0.1f, -1.5f, -5}, {0.1f, 1.5f, -0.4f}, white);
+    addBlock(scene, "wall_right", {-0.1f, -1.5f, 0.4f}, {0.1f, 1.5f, 5}, white);
+    addBlock(scene, "lintel", {-0.1f, 0.5f, -0.4f}, {0.1f, 1.5f, 0.4f}, white);
     scene.doors = {{"door", false}};
-    addSolid(scene, "leaf", {-0.03f, -1.5f, -0.4f}, {0.03f, 0.5f, 0.4f}, white, 0);
+    addBlock(scene, "leaf", {-0.03f, -1.5f, -0.4f}, {0.03f, 0.5f, 0.4f}, white, 0);
     scene.light_sets = {{"lamp", 1}};
     addPointLight(scene, {-1.5f, 0.8f, 0.2f}, 100, BakeMode::Indirect).light_set = 0;
     return scene;

@@ -13,19 +13,6 @@
 namespace dimmer::cook::test {
 namespace {
 
-// An outward-facing box.
-void addSolid(Scene& scene, const char* node, glm::vec3 centre, glm::vec3 half, uint32_t material,
-              std::optional<uint32_t> door = {}) {
-    for (int axis = 0; axis < 3; ++axis)
-        for (float side : {-1.0f, 1.0f}) {
-            glm::vec3 place = centre, u(0), v(0);
-            place[axis] += side * half[axis];
-            u[(axis + 1) % 3] = half[(axis + 1) % 3];
-            v[(axis + 2) % 3] = half[(axis + 2) % 3];
-            addQuad(scene, node, place, side > 0 ? u : v, side > 0 ? v : u, material).door = door;
-        }
-}
-
 // A corridor of four rooms of 2 m in a row along x, parted by doors that fill it from wall to wall; two light sets and
 // a little always-on light.
 Scene corridor() {

@@ -5,8 +5,6 @@
 namespace dimmer::cook::test {
 namespace {
 
-constexpr double pi_d = std::numbers::pi;
-
 // Share of the hemisphere over a floor's point that a square of `half` metres to each side fills, `height` above and
 // centred over (0, 0): four rectangles with a corner over the point, those beyond the square's border negative.
 double squareAbove(double x, double z, double half, double height) {

@@ -6,8 +6,6 @@
 namespace dimmer::cook::test {
 namespace {
 
-constexpr double pi_d = std::numbers::pi;
-
 // The left half of one kind, the right half of another.
 uint32_t addHalfImage(Scene& scene, glm::vec4 left, glm::vec4 right) {
     // Wide enough that filtering blurs a hundredth of it.

@@ -9,7 +9,7 @@
 namespace dimmer::cook::test {
 namespace {
 
-constexpr double pi_d = std::numbers::pi, bias_share = 1e-3;
+constexpr double bias_share = 1e-3;
 const glm::vec3 up(0, 1, 0);
 
 ReferenceValue trace(const Scene& scene, glm::vec3 point, glm::vec3 normal, uint32_t paths,

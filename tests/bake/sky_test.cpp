@@ -10,8 +10,6 @@
 namespace dimmer::cook::test {
 namespace {
 
-constexpr double pi_d = std::numbers::pi;
-
 std::shared_ptr<const Image> skyImage(uint32_t width, uint32_t height, auto&& radiance) {
     Image image{width, height, {}};
     for (uint32_t y = 0; y < height; ++y)

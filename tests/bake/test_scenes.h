@@ -5,8 +5,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace dimmer::cook::test {
+
+constexpr double pi_d = std::numbers::pi;
 
 // Lambert with exactly this reflectance (no specular share is added).
 inline Material lambert(float rho) {
@@ -44,6 +47,19 @@ inline SceneMesh& addQuad(Scene& scene, const char* node, glm::vec3 centre, glm:
 // Facing up, around the origin, `half` metres to each side.
 inline SceneMesh& addFloor(Scene& scene, float half, uint32_t material, float height = 0) {
     return addQuad(scene, "floor", {0, height, 0}, {0, 0, half}, {half, 0, 0}, material);
+}
+
+// An outward-facing box of `half` metres to each side of its centre.
+inline void addSolid(Scene& scene, const char* node, glm::vec3 centre, glm::vec3 half, uint32_t material,
+                     std::optional<uint32_t> door = {}) {
+    for (int axis = 0; axis < 3; ++axis)
+        for (float side : {-1.0f, 1.0f}) {
+            glm::vec3 place = centre, u(0), v(0);
+            place[axis] += side * half[axis];
+            u[(axis + 1) % 3] = half[(axis + 1) % 3];
+            v[(axis + 2) % 3] = half[(axis + 2) % 3];
+            addQuad(scene, node, place, side > 0 ? u : v, side > 0 ? v : u, material).door = door;
+        }
 }
 
 // A closed box around the origin that faces inwards.

@@ -22,7 +22,7 @@ struct Fault {
 };
 
 // Byte offsets are those of docs/format.md.
-const Fault faults[] = {
+const Fault content_faults[] = {
     {"elements: a count past the chunk", [](PackFile& f) { f.chunk("ELEM").write(0, 7u); }, "ELEM is malformed"},
     {"elements: a huge count", [](PackFile& f) { f.chunk("ELEM").write(0, UINT32_MAX); }, "ELEM is malformed"},
     {"elements: a huge name", [](PackFile& f) { f.chunk("ELEM").write(4, UINT32_MAX); }, "ELEM is malformed"},
@@ -83,7 +83,7 @@ const Fault faults[] = {
 TEST(PackContent, FaultsAreNamed) {
     const PackFile good(packBytes(samplePack()));
     ASSERT_TRUE(Pack::fromBytes(good.bytes(), "test").has_value());
-    for (const Fault& fault : faults) {
+    for (const Fault& fault : content_faults) {
         PackFile file = good;
         fault.apply(file);
         const auto pack = Pack::fromBytes(file.bytes(), "level.dimmer");

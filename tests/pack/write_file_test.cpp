@@ -1,4 +1,5 @@
 // A pack on disk is as it was or complete, whatever happens while it is written.
+#include <app/process.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <scene/level_file.h>
@@ -9,22 +10,15 @@
 
 #include <csignal>
 #include <fstream>
-#include <sstream>
 
 namespace dimmer::cook::test {
 namespace {
 
+using dimmer::test::readText;
 using testing::HasSubstr;
 
 Expected<void> write(const std::filesystem::path& path, const std::string& text) {
     return writeFileAtomically(path, std::as_bytes(std::span(text)));
-}
-
-std::string read(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
 }
 
 size_t filesIn(const std::filesystem::path& folder) {
@@ -63,11 +57,11 @@ TEST(WriteFile, MakesAndReplaces) {
     const TemporaryFolder folder;
     const auto path = folder.path / "a.dimmer";
     ASSERT_TRUE(write(path, "one"));
-    EXPECT_EQ(read(path), "one");
+    EXPECT_EQ(readText(path), "one");
     ASSERT_TRUE(write(path, "the second"));
-    EXPECT_EQ(read(path), "the second");
+    EXPECT_EQ(readText(path), "the second");
     ASSERT_TRUE(write(path, ""));
-    EXPECT_EQ(read(path), "");
+    EXPECT_EQ(readText(path), "");
     EXPECT_EQ(filesIn(folder.path), 1u);
     // Readable as any file that the user makes.
     struct stat status {};
@@ -86,7 +80,7 @@ TEST(WriteFile, AFullDiskLeavesTheOldFile) {
         expectIoError(write(path, std::string(1 << 20, 'x')), path, "nothing was changed");
         expectIoError(write(folder.path / "b.dimmer", std::string(1 << 20, 'x')), folder.path / "b.dimmer", "large");
     }
-    EXPECT_EQ(read(path), "old");
+    EXPECT_EQ(readText(path), "old");
     EXPECT_EQ(filesIn(folder.path), 1u);  // no temporary, no b.dimmer
 }
 
@@ -108,7 +102,7 @@ TEST(WriteFile, AFolderWithoutRightsLeavesTheOldFile) {
     expectIoError(write(path, "new"), path, "in this folder");
     expectIoError(write(folder.path / "b.dimmer", "new"), folder.path / "b.dimmer", "in this folder");
     std::filesystem::permissions(folder.path, std::filesystem::perms::owner_all);
-    EXPECT_EQ(read(path), "old");
+    EXPECT_EQ(readText(path), "old");
     EXPECT_EQ(filesIn(folder.path), 1u);
 }
 
@@ -119,7 +113,7 @@ TEST(WriteFile, AFolderIsNotReplaced) {
     std::filesystem::create_directory(full);
     std::ofstream(full / "inside") << "kept";
     expectIoError(write(full, "x"), full, "directory");
-    EXPECT_EQ(read(full / "inside"), "kept");
+    EXPECT_EQ(readText(full / "inside"), "kept");
     EXPECT_EQ(filesIn(folder.path), 1u);
 }
 
@@ -137,7 +131,7 @@ TEST(WriteFile, LinksAreFollowed) {
     std::filesystem::create_symlink("target", link);
     ASSERT_TRUE(write(link, "new"));
     EXPECT_TRUE(std::filesystem::is_symlink(link));
-    EXPECT_EQ(read(target), "new");
+    EXPECT_EQ(readText(target), "new");
     EXPECT_EQ(filesIn(folder.path), 2u);
 }
 

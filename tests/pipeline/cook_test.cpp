@@ -13,20 +13,13 @@ namespace {
 constexpr const char* quick_profile = R"({"bake": {"draft":
     {"samples_per_texel": 2, "series_rays": 8, "rays": 32, "emitter_samples": 2, "bounces": 8}}})";
 
-std::string read(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    std::stringstream text;
-    text << file.rdbuf();
-    return text.str();
-}
-
 // The bytes of the pack that `cook` writes; empty, and the test fails, when it does not.
 std::string cookBytes(const CookOptions& options) {
     SilentProgress silent;
     const auto result = cook(options, silent);
     EXPECT_TRUE(result.has_value()) << result.error().message;
     if (!result) return {};
-    const std::string bytes = read(options.pack);
+    const std::string bytes = dimmer::test::readText(options.pack);
     EXPECT_EQ(bytes.size(), result->file_bytes);
     return bytes;
 }
@@ -129,7 +122,7 @@ TEST(Cook, BadInputWritesNothing) {
         EXPECT_EQ(result.error().code, code) << result.error().message;
         EXPECT_FALSE(result.error().message.empty());
     }
-    EXPECT_EQ(read(old), "the old pack");
+    EXPECT_EQ(dimmer::test::readText(old), "the old pack");
     EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path), {}), 3);
 }
 

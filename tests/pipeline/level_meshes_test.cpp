@@ -29,7 +29,7 @@ Result build(const LevelFile& level, uint32_t page_size = 128) {
     return result;
 }
 
-struct Corner {
+struct LitCorner {
     glm::vec3 position_m, normal;
     glm::vec2 uv;
 };
@@ -39,7 +39,7 @@ template <class Visit>
 void forTriangles(const std::vector<Mesh>& meshes, Visit&& visit) {
     for (const Mesh& mesh : meshes)
         for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
-            std::array<Corner, 3> corners;
+            std::array<LitCorner, 3> corners;
             for (size_t k = 0; k < 3; ++k) {
                 const MeshVertex& v = mesh.vertices[mesh.indices[i + k]];
                 corners[k] = {vec(v.position_m), vec(v.normal), {v.lightmap_uv[0], v.lightmap_uv[1]}};
@@ -48,7 +48,7 @@ void forTriangles(const std::vector<Mesh>& meshes, Visit&& visit) {
         }
 }
 
-double area(const std::array<Corner, 3>& c) {
+double area(const std::array<LitCorner, 3>& c) {
     return 0.5 * static_cast<double>(
                      glm::length(glm::cross(c[1].position_m - c[0].position_m, c[2].position_m - c[0].position_m)));
 }
@@ -75,7 +75,7 @@ TEST(LevelMeshes, WindingAgreesWithNormals) {
     size_t triangles = 0;
     forTriangles(result.meshes, [&](const Mesh& mesh, const auto& c) {
         const glm::vec3 front = glm::cross(c[1].position_m - c[0].position_m, c[2].position_m - c[0].position_m);
-        for (const Corner& corner : c) {
+        for (const LitCorner& corner : c) {
             // The level is flat-shaded: both normals are the same line, within rounding of unit vectors.
             EXPECT_GT(glm::dot(glm::normalize(front), corner.normal), 0.9999f) << mesh.node;
         }
@@ -99,7 +99,7 @@ TEST(LevelMeshes, UvsLieInsideOneChartWithoutItsPadding) {
             // A thousandth of a texel for the rounding of UVs.
             const glm::vec2 low = glm::vec2(chart.x + 1, chart.y + 1) - 0.001f;
             const glm::vec2 high = glm::vec2(chart.x + chart.width - 1, chart.y + chart.height - 1) + 0.001f;
-            return chart.page == mesh.page && std::ranges::all_of(c, [&](const Corner& corner) {
+            return chart.page == mesh.page && std::ranges::all_of(c, [&](const LitCorner& corner) {
                        const glm::vec2 texel = corner.uv * size;
                        return texel.x >= low.x && texel.y >= low.y && texel.x <= high.x && texel.y <= high.y;
                    });
@@ -112,7 +112,7 @@ TEST(LevelMeshes, ADoubleSidedSurfaceHasTwoSides) {
     LevelFile level;
     level.addNode({{"name", "screen"}, {"mesh", level.addSquareMesh(addWhite(level, {{"doubleSided", true}}))}});
     const auto result = build(level);
-    std::vector<Corner> front, back;
+    std::vector<LitCorner> front, back;
     forTriangles(result.meshes, [&](const Mesh& mesh, const auto& c) {
         EXPECT_EQ(mesh.node, "screen");
         auto& side = c[0].normal.z > 0 ? front : back;
@@ -120,9 +120,9 @@ TEST(LevelMeshes, ADoubleSidedSurfaceHasTwoSides) {
     });
     ASSERT_EQ(front.size(), 6u);
     ASSERT_EQ(back.size(), 6u);
-    for (const Corner& f : front) {
+    for (const LitCorner& f : front) {
         EXPECT_EQ(f.normal, glm::vec3(0, 0, 1));
-        const auto twin = std::ranges::find(back, f.position_m, &Corner::position_m);
+        const auto twin = std::ranges::find(back, f.position_m, &LitCorner::position_m);
         ASSERT_NE(twin, back.end());
         EXPECT_EQ(twin->normal, glm::vec3(0, 0, -1));
         EXPECT_NE(twin->uv, f.uv);  // a lightmap of its own

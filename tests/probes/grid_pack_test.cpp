@@ -74,7 +74,7 @@ struct Fault {
     std::string message;
 };
 
-const Fault faults[] = {
+const Fault grid_faults[] = {
     {"more places than probes", [](ProbeData& p) { p.global.positions.resize(p.base.size() + 1); }, "places and"},
     {"a level too few", [](ProbeData& p) { p.global.levels.pop_back(); }, "49 levels"},
     {"a place that is none", [](ProbeData& p) { p.global.positions[3].y_m = nan; }, "a probe stands nowhere"},
@@ -104,7 +104,7 @@ const Fault faults[] = {
 
 TEST(GridPack, EveryRuleIsChecked) {
     ASSERT_TRUE(validate(gridPack()));
-    for (const Fault& fault : faults) {
+    for (const Fault& fault : grid_faults) {
         PackData data = gridPack();
         fault.apply(data.probes);
         const auto valid = validate(data);

@@ -9,9 +9,9 @@
 namespace dimmer::cook {
 namespace {
 
-using test::pick;
-using test::Random;
-using test::uniform;
+using dimmer::test::pick;
+using dimmer::test::Random;
+using dimmer::test::uniform;
 
 glm::dvec3 at(const GlobalGrid& grid, uint32_t probe) {
     const ProbePosition& p = grid.positions[probe];
