@@ -14,7 +14,7 @@
 namespace dimmer::sample {
 namespace {
 
-constexpr VkShaderStageFlags stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
+constexpr VkShaderStageFlags model_stages = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT;
 constexpr double turn_s = 10;
 
 // As in model.glsl.
@@ -132,7 +132,7 @@ Expected<void> ModelRenderer::createGeometry(const VulkanContext& vulkan) {
 
 Expected<void> ModelRenderer::createDescriptors(const VulkanContext& vulkan, VkBuffer probes) {
     VkDescriptorSetLayoutBinding bindings[2]{};
-    for (uint32_t i = 0; i < 2; ++i) bindings[i] = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, stages, nullptr};
+    for (uint32_t i = 0; i < 2; ++i) bindings[i] = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, model_stages, nullptr};
     auto layout = vkStruct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
     layout.bindingCount = std::size(bindings);
     layout.pBindings = bindings;
@@ -167,7 +167,7 @@ Expected<void> ModelRenderer::createDescriptors(const VulkanContext& vulkan, VkB
 
 Expected<void> ModelRenderer::createLayout(VkDevice device) {
     const VkDescriptorSetLayout set_layout = set_layout_.get();
-    const VkPushConstantRange range{stages, 0, sizeof(ModelConstants)};
+    const VkPushConstantRange range{model_stages, 0, sizeof(ModelConstants)};
     auto info = vkStruct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
     info.setLayoutCount = 1;
     info.pSetLayouts = &set_layout;
@@ -215,7 +215,7 @@ Expected<void> ModelRenderer::draw(VkCommandBuffer commands, const glm::mat4& cl
     const VkDeviceSize offset = 0;
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline_.get());
     vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout_.get(), 0, 1, &descriptors_, 0, nullptr);
-    vkCmdPushConstants(commands, layout_.get(), stages, 0, sizeof(constants), &constants);
+    vkCmdPushConstants(commands, layout_.get(), model_stages, 0, sizeof(constants), &constants);
     vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &offset);
     vkCmdBindIndexBuffer(commands, indices_.buffer.get(), 0, VK_INDEX_TYPE_UINT32);
     for (uint32_t i = 0; i < draws_.size(); ++i)

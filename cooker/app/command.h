@@ -31,6 +31,7 @@ void addReferenceCommand(CLI::App& app, int& exit_code);
 void addExplainCommand(CLI::App& app, int& exit_code);
 void addExportCommand(CLI::App& app, int& exit_code);
 void addReportCommand(CLI::App& app, int& exit_code);
+void addStressCommand(CLI::App& app, int& exit_code);
 
 // Prints the message to stderr; the exit code that belongs to it.
 int reportError(const Error& error);

@@ -59,6 +59,7 @@ int main(int argc, char** argv) {
     addExplainCommand(app, exit_code);
     addExportCommand(app, exit_code);
     addReportCommand(app, exit_code);
+    addStressCommand(app, exit_code);
     if (!isCommand(app, argc, argv)) return exit_bad_input;
     try {
         endCleanlyOnInterrupt();

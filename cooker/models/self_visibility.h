@@ -13,9 +13,9 @@ namespace dimmer::cook {
 // (else the same as the front's).
 using ModelTransfers = std::vector<std::vector<std::array<LightTransfer, 2>>>;
 
-// In the model's axes. 512 rays from around each vertex against the model's own triangles: light from far away that arrives
-// straight, and after up to two bounces off the model itself, by the mean of its reflectance's channels (Sloan, Kautz
-// and Snyder 2002, interreflected transfer). A convex model hides nothing, and gives the transfer of the normal.
+// In the model's axes. 512 rays from around each vertex against the model's own triangles: light from far away that
+// arrives straight, and after up to two bounces off the model itself, by the mean of its reflectance's channels (Sloan,
+// Kautz and Snyder 2002, interreflected transfer). A convex model hides nothing, and gives the transfer of the normal.
 ModelTransfers selfVisibility(const Scene& scene, const SceneModel& model);
 
 }  // namespace dimmer::cook

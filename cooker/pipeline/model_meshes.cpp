@@ -25,7 +25,7 @@ struct SurfacePoint {
 };
 
 // Triangles of one material, with vertices of the scene; both sides of what is double-sided.
-struct Part {
+struct MaterialPart {
     std::vector<SurfacePoint> points;
     std::vector<uint32_t> indices;
     std::map<std::tuple<uint32_t, uint32_t, bool>, uint32_t> index;  // of mesh, vertex, side
@@ -43,16 +43,17 @@ struct Part {
         }
     }
 };
-using PartKey = std::pair<uint32_t, std::optional<uint32_t>>;  // material, and the light set that dims its emission
+using MaterialPartKey =
+    std::pair<uint32_t, std::optional<uint32_t>>;  // material, and the light set that dims its emission
 
-std::map<PartKey, Part> partsOf(const Scene& scene, const SceneModel& model) {
+std::map<MaterialPartKey, MaterialPart> partsOf(const Scene& scene, const SceneModel& model) {
     const ModelTransfers transfers = selfVisibility(scene, model);
-    std::map<PartKey, Part> parts;
+    std::map<MaterialPartKey, MaterialPart> parts;
     for (uint32_t m = 0; m < model.meshes.size(); ++m) {
         const SceneMesh& mesh = scene.meshes[model.meshes[m]];
         for (size_t t = 0; t < mesh.triangles.size(); ++t) {
             const uint32_t material = mesh.triangle_materials[t];
-            Part& part = parts[{material, mesh.light_set}];
+            MaterialPart& part = parts[{material, mesh.light_set}];
             part.add(mesh, m, transfers, mesh.triangles[t], false);
             if (scene.materials[material].double_sided) part.add(mesh, m, transfers, mesh.triangles[t], true);
         }
@@ -96,7 +97,7 @@ class ModelMeshes {
         return {first, static_cast<uint32_t>(pack_.model_meshes.size()) - first};
     }
 
-    ModelMesh meshOf(const SceneModel& model, const PartKey& key, const Part& part) const {
+    ModelMesh meshOf(const SceneModel& model, const MaterialPartKey& key, const MaterialPart& part) const {
         const Material& material = scene_.materials[key.first];
         const glm::mat3 model_from_world = glm::transpose(model.world_from_model);
         std::vector<glm::vec3> positions;

@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 #include <probes/placement.h>
 #include <probes/probe_gather.h>
+#include <probes/tetrahedra.h>
 
 #include <algorithm>
 
@@ -10,10 +11,6 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t probe_seed = 0x9b05688cu;
-
-glm::vec3 vec(const ProbePosition& p) {
-    return {p.x_m, p.y_m, p.z_m};
-}
 
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;

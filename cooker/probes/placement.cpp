@@ -36,10 +36,6 @@ constexpr size_t exchange_part = 5;        // one in so many is exchanged
 constexpr float importance_floor = 0.05f;  // of the mean light: darker sites count no more
 constexpr float floor_of_mean = 0.01f;     // as the error measures have it
 
-glm::vec3 vec(const ProbePosition& p) {
-    return {p.x_m, p.y_m, p.z_m};
-}
-
 class Placer {
    public:
     Placer(const Sites& sites, const GridSettings& settings, Progress& progress)

@@ -10,6 +10,10 @@
 
 namespace dimmer::cook {
 
+inline glm::vec3 vec(const ProbePosition& p) {
+    return {p.x_m, p.y_m, p.z_m};
+}
+
 struct Box {
     glm::vec3 min_m{0}, max_m{0};
 };

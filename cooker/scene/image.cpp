@@ -12,7 +12,7 @@ namespace dimmer::cook {
 namespace {
 
 // 8192 x 8192: 1 GiB as linear floats, and what GPUs handle everywhere.
-constexpr uint64_t texels_max = uint64_t{1} << 26;
+constexpr uint64_t image_texels_max = uint64_t{1} << 26;
 
 // IEC 61966-2-1.
 float linearFromSrgb(float encoded) {
@@ -75,7 +75,7 @@ Expected<Image> decodeImage(const ImportContext& context, int index, TransferFun
     const auto size = static_cast<int>(std::min<size_t>(bytes.size(), std::numeric_limits<int>::max()));
     int width = 0, height = 0, channels = 0;
     const bool known = stbi_info_from_memory(bytes.data(), size, &width, &height, &channels) != 0;
-    if (known && static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > texels_max)
+    if (known && static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > image_texels_max)
         return context.error(
             owner, fmt::format("{} has {} x {} texels. Scale it to 8192 x 8192 or less.", label, width, height));
     const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(

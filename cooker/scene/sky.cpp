@@ -18,7 +18,7 @@ namespace dimmer::cook {
 namespace {
 
 // 8192 x 4096: a sky of that size is half a gibibyte in memory, and finer than any bake can tell.
-constexpr uint64_t texels_max = uint64_t{1} << 25;
+constexpr uint64_t sky_texels_max = uint64_t{1} << 25;
 
 constexpr int exr_side_max = 65536;
 
@@ -27,8 +27,8 @@ std::unexpected<Error> refuse(const std::string& file, std::string_view what) {
 }
 
 Expected<Image> sized(int64_t width, int64_t height, const std::string& file) {
-    if (width < 1 || height < 1 || static_cast<uint64_t>(width) > texels_max ||
-        static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > texels_max)
+    if (width < 1 || height < 1 || static_cast<uint64_t>(width) > sky_texels_max ||
+        static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > sky_texels_max)
         return refuse(file, fmt::format("has {} x {} texels. Scale it to 8192 x 4096 or less.", width, height));
     Image image{static_cast<uint32_t>(width), static_cast<uint32_t>(height), {}};
     image.texels.resize(size_t{image.width} * image.height, glm::vec4(0, 0, 0, 1));

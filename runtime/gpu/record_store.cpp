@@ -30,12 +30,25 @@ Expected<RecordStore> RecordStore::create(const VulkanContext& vulkan, const Pac
         createTexelBuffer(vulkan, records * sizeof(TexelRecord), VK_FORMAT_R32G32B32A32_UINT, MemoryUse::Device);
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     store.buffer_ = std::move(*buffer);
-    store.pool_ = RecordPool(records);
+    if (records < all) {
+        store.pool_ = RecordPool(records);
+        return store;
+    }
+    // Ranges of their own: those of a pool, taken back and given out in any order, would come to lie in its way.
+    uint64_t first = 0;
+    for (const uint64_t count : store.counts_) {
+        store.home_.push_back(first);
+        first += count;
+    }
     return store;
 }
 
 Expected<void> RecordStore::reserve(uint32_t contribution) {
     if (reserved(contribution)) return {};
+    if (!home_.empty()) {
+        first_[contribution] = home_[contribution];
+        return {};
+    }
     const auto first = pool_.allocate(counts_[contribution]);
     if (!first && counts_[contribution] > 0)
         return fail(
@@ -49,7 +62,7 @@ Expected<void> RecordStore::reserve(uint32_t contribution) {
 
 void RecordStore::release(uint32_t contribution) {
     if (!reserved(contribution)) return;
-    pool_.release(*first_[contribution], counts_[contribution]);
+    if (home_.empty()) pool_.release(*first_[contribution], counts_[contribution]);
     first_[contribution].reset();
 }
 

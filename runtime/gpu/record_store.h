@@ -20,7 +20,8 @@ class RecordStore {
     VkBuffer buffer() const { return buffer_.buffer.buffer.get(); }
     uint64_t deviceBytes() const { return buffer_.buffer.size_bytes; }
 
-    // A range for the contribution's records; they are still to be written. OutOfMemory where none is long enough.
+    // A range for the contribution's records; they are still to be written. Where there is room for all, each has its
+    // own. OutOfMemory where no free range is long enough.
     Expected<void> reserve(uint32_t contribution);
     // Its range is free for others. Commands that read it must be submitted before those that write others there.
     void release(uint32_t contribution);
@@ -39,7 +40,8 @@ class RecordStore {
    private:
     const PackData* data_ = nullptr;
     TexelBuffer buffer_;
-    RecordPool pool_;
+    RecordPool pool_;             // where there is not room for all
+    std::vector<uint64_t> home_;  // per contribution, its range where there is room for all; empty where there is not
     std::vector<std::optional<uint64_t>> first_;  // per contribution
     std::vector<uint64_t> counts_;                // likewise, gaps included
     std::vector<uint32_t> within_;                // per term, within its contribution, less the cluster's place

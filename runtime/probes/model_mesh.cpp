@@ -33,13 +33,14 @@ Vec3 times(const Mat3& m, const Vec3& v) {
 }
 
 // Factors of harmonics of band 2: of a product of axes, of z^2, of x^2 - y^2.
-constexpr float product = 1.092548431f, polar = 0.315391565f, across = 0.546274215f;
+constexpr float band2_product = 1.092548431f, band2_polar = 0.315391565f, band2_across = 0.546274215f;
 
 // Band 2 as w.M w, M symmetric without trace.
 Mat3 quadratic(const std::array<float, 9>& t) {
-    const float xy = 0.5f * product * t[4], yz = 0.5f * product * t[5], xz = 0.5f * product * t[7];
-    return {
-        {{across * t[8] - polar * t[6], xy, xz}, {xy, -across * t[8] - polar * t[6], yz}, {xz, yz, 2 * polar * t[6]}}};
+    const float xy = 0.5f * band2_product * t[4], yz = 0.5f * band2_product * t[5], xz = 0.5f * band2_product * t[7];
+    return {{{band2_across * t[8] - band2_polar * t[6], xy, xz},
+             {xy, -band2_across * t[8] - band2_polar * t[6], yz},
+             {xz, yz, 2 * band2_polar * t[6]}}};
 }
 
 }  // namespace
@@ -72,8 +73,9 @@ LightTransfer modelTransfer(const ModelVertex& vertex, const Transform& world_fr
     const Mat3 m = quadratic(t);
     Mat3 turned;
     for (size_t c = 0; c < 3; ++c) turned[c] = times(r, times(m, {r[0][c], r[1][c], r[2][c]}));
-    return {{t[0], lobe[1], lobe[2], lobe[0], 2 * turned[1][0] / product, 2 * turned[2][1] / product,
-             turned[2][2] / (2 * polar), 2 * turned[2][0] / product, (turned[0][0] - turned[1][1]) / (2 * across)}};
+    return {{t[0], lobe[1], lobe[2], lobe[0], 2 * turned[1][0] / band2_product, 2 * turned[2][1] / band2_product,
+             turned[2][2] / (2 * band2_polar), 2 * turned[2][0] / band2_product,
+             (turned[0][0] - turned[1][1]) / (2 * band2_across)}};
 }
 
 LightTransfer normalTransfer(std::array<float, 3> normal) {

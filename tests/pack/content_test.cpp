@@ -15,14 +15,14 @@ namespace {
 using cook::packBytes;
 using testing::HasSubstr;
 
-struct Fault {
+struct ContentFault {
     const char* name;
     std::function<void(PackFile&)> apply;
     std::string message;
 };
 
 // Byte offsets are those of docs/format.md.
-const Fault content_faults[] = {
+const ContentFault content_faults[] = {
     {"elements: a count past the chunk", [](PackFile& f) { f.chunk("ELEM").write(0, 7u); }, "ELEM is malformed"},
     {"elements: a huge count", [](PackFile& f) { f.chunk("ELEM").write(0, UINT32_MAX); }, "ELEM is malformed"},
     {"elements: a huge name", [](PackFile& f) { f.chunk("ELEM").write(4, UINT32_MAX); }, "ELEM is malformed"},
@@ -83,7 +83,7 @@ const Fault content_faults[] = {
 TEST(PackContent, FaultsAreNamed) {
     const PackFile good(packBytes(samplePack()));
     ASSERT_TRUE(Pack::fromBytes(good.bytes(), "test").has_value());
-    for (const Fault& fault : content_faults) {
+    for (const ContentFault& fault : content_faults) {
         PackFile file = good;
         fault.apply(file);
         const auto pack = Pack::fromBytes(file.bytes(), "level.dimmer");

@@ -1,4 +1,5 @@
 // The whole cook: the same input gives the same bytes, and bad input gives none.
+#include <app/process.h>
 #include <gmock/gmock.h>
 #include <pipeline/small_level.h>
 

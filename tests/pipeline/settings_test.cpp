@@ -1,4 +1,5 @@
 // The list of settings: the schema that goes by it, where a mistake stands, and who has the last word.
+#include <app/process.h>
 #include <gmock/gmock.h>
 #include <pipeline/json_lines.h>
 #include <pipeline/settings.h>
@@ -10,13 +11,9 @@
 namespace dimmer::cook::test {
 namespace {
 
+using dimmer::test::readText;
 using testing::AllOf;
 using testing::HasSubstr;
-
-std::string readText(const std::filesystem::path& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-}
 
 const std::filesystem::path schema_file = std::filesystem::path(DIMMER_SOURCE_DIR) / "profiles/schema.json";
 

@@ -13,9 +13,6 @@ using test::packOf;
 
 class AsyncTest : public test::GpuTest {
    protected:
-    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
-        return runtimeOn(device().context(), pack, options);
-    }
     static Runtime runtimeOn(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {}) {
         auto runtime = Runtime::create(vulkan, pack, options);
         if (!runtime) throw std::runtime_error(runtime.error().message);

@@ -35,6 +35,11 @@ class GpuTest : public testing::Test {
     }
 
     static const HeadlessDevice& device() { return *device_; }
+    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
+        auto runtime = Runtime::create(device().context(), pack, options);
+        if (!runtime) throw std::runtime_error(runtime.error().message);
+        return std::move(*runtime);
+    }
 
    private:
     static inline std::optional<HeadlessDevice> device_;

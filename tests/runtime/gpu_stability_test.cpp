@@ -13,14 +13,7 @@ namespace {
 
 using test::packOf;
 
-class GpuStability : public test::GpuTest {
-   protected:
-    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
-        auto runtime = Runtime::create(device().context(), pack, options);
-        if (!runtime) throw std::runtime_error(runtime.error().message);
-        return std::move(*runtime);
-    }
-};
+using GpuStability = test::GpuTest;
 
 // A million with DIMMER_TOGGLES=1000000, which takes minutes; the CPU runtime's test always runs them.
 TEST_F(GpuStability, RandomTogglesEndInTheStateOfAFreshRuntime) {

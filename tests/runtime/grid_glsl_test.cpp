@@ -16,9 +16,10 @@
 namespace dimmer {
 namespace {
 
+using test::valueOf;
 using Vec4 = std::array<float, 4>;
 
-struct Query {
+struct GridQuery {
     Vec4 position;  // w: exposure
     Vec4 normal;    // w: colour format
     std::array<Vec4, 3> transfer;
@@ -28,21 +29,16 @@ struct Result {
     Vec4 model_lux, grid_lux, shadowed_lux;
 };
 
-template <class T>
-T valueOf(Expected<T> expected) {
-    if (!expected) throw std::runtime_error(expected.error().message);
-    return std::move(*expected);
-}
-
 std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime, const ModelSlot& slot,
-                             const std::vector<Query>& queries) {
+                             const std::vector<GridQuery>& queries) {
     const auto filled = [&](const void* data, size_t bytes) {
         GpuBuffer buffer = valueOf(createBuffer(vulkan, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Upload));
         std::memcpy(buffer.mapped, data, bytes);
         return buffer;
     };
     static_assert(sizeof(ModelSlot) == 64);  // DimmerModelSlot
-    const GpuBuffer model = filled(&slot, sizeof(slot)), input = filled(queries.data(), queries.size() * sizeof(Query));
+    const GpuBuffer model = filled(&slot, sizeof(slot)),
+                    input = filled(queries.data(), queries.size() * sizeof(GridQuery));
     std::vector<Result> results(queries.size());
     const GpuBuffer output = valueOf(
         createBuffer(vulkan, results.size() * sizeof(Result), VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Readback));
@@ -90,9 +86,9 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
         ASSERT_TRUE(cpu.addModel(grid, place) && gpu.submit() && gpu.wait());
         cpu.update();
 
-        std::vector<Query> queries(2000);
+        std::vector<GridQuery> queries(2000);
         std::vector<ModelVertex> vertices;
-        for (Query& q : queries) {
+        for (GridQuery& q : queries) {
             const float z = test::uniform(random, -1, 1), angle = test::uniform(random, 0, 6.2831853f);
             const float r = std::sqrt(1 - z * z);
             q = {{test::uniform(random, 2, 8), test::uniform(random, -1, 4), test::uniform(random, 3, 9),

@@ -19,8 +19,6 @@ namespace {
 using test::packOf;
 using test::uniform;
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
 // L_00 of light of `v` from everywhere, that gives pi v lux at exposure 1.
 constexpr float dcOf(float v) {
     return v * 3.54490770f;  // sqrt(4 pi)
@@ -47,7 +45,7 @@ TEST(ModelGrid, HasAGradientAndALimit) {
     const ModelGrid large = modelGrid({0, 0, 0}, {600, 600, 600}, 1.5f, 64);
     EXPECT_LE(large.probeCount(), 64u);
     EXPECT_GE(large.probeCount(), 27u);
-    EXPECT_LE(modelGrid({0, 0, 0}, {infinity, 1, 1}).probeCount(), 2u * 2 * 64);
+    EXPECT_LE(modelGrid({0, 0, 0}, {std::numeric_limits<float>::infinity(), 1, 1}).probeCount(), 2u * 2 * 64);
 }
 
 TEST(Models, AModelIsLitByTheLightWhereItStands) {
@@ -166,11 +164,13 @@ TEST(Models, WhatMakesNoSenseIsRefused) {
     EXPECT_EQ(code({{0, 0, 0}, {1, 1, 1}, {0, 2, 2}}, {}), ErrorCode::InvalidArgument);
     EXPECT_EQ(code({{0, 0, 0}, {1, 1, 1}, {65, 2, 2}}, {}), ErrorCode::InvalidArgument);
     EXPECT_EQ(code({{0, 2, 0}, {1, 1, 1}, {2, 2, 2}}, {}), ErrorCode::InvalidArgument);
-    EXPECT_EQ(code({{0, 0, 0}, {1, infinity, 1}, {2, 2, 2}}, {}), ErrorCode::InvalidArgument);
+    EXPECT_EQ(code({{0, 0, 0}, {1, std::numeric_limits<float>::infinity(), 1}, {2, 2, 2}}, {}),
+              ErrorCode::InvalidArgument);
     EXPECT_EQ(code({}, at(NAN, 0, 0)), ErrorCode::InvalidArgument);
     EXPECT_EQ(code({}, {{{{1, 0, 0, 0}, {0, 1, 0, 0}, {1, 1, 0, 0}}}}), ErrorCode::InvalidArgument);
     const Model model = *runtime.addModel({}, {});
-    EXPECT_EQ(runtime.moveModel(model, at(infinity, 0, 0)).error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(runtime.moveModel(model, at(std::numeric_limits<float>::infinity(), 0, 0)).error().code,
+              ErrorCode::InvalidArgument);
     EXPECT_EQ(runtime.moveModel({7, 0}, {}).error().code, ErrorCode::InvalidArgument);
     // A pack without a grid.
     CpuRuntime other(packOf(test::randomPack(1)), 1, 64);
@@ -179,14 +179,7 @@ TEST(Models, WhatMakesNoSenseIsRefused) {
     EXPECT_EQ(none.addModel({}, {}).error().code, ErrorCode::OutOfMemory);
 }
 
-class GpuModels : public test::GpuTest {
-   protected:
-    Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options) {
-        auto runtime = Runtime::create(device().context(), pack, options);
-        if (!runtime) throw std::runtime_error(runtime.error().message);
-        return std::move(*runtime);
-    }
-};
+using GpuModels = test::GpuTest;
 
 // Random light with directions and visibility, as far from smooth as a grid can be.
 PackData wildPack(uint32_t seed, ColorFormat format) {

@@ -11,6 +11,13 @@
 
 namespace dimmer::test {
 
+// What a call that must succeed gave; throws its message otherwise.
+template <class T>
+T valueOf(Expected<T> expected) {
+    if (!expected) throw std::runtime_error(expected.error().message);
+    return std::move(*expected);
+}
+
 inline Pack packOf(PackData data) {
     auto pack = Pack::fromData(std::move(data));
     if (!pack) throw std::runtime_error(pack.error().message);

@@ -134,11 +134,6 @@ TEST(PackProbes, SyntheticLevelsHaveAsManyAsTable1) {
 
 class GpuProbes : public test::GpuTest {
    protected:
-    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
-        auto runtime = Runtime::create(device().context(), pack, options);
-        if (!runtime) throw std::runtime_error(runtime.error().message);
-        return std::move(*runtime);
-    }
     static void expectEqual(Runtime& gpu, const CpuRuntime& cpu) {
         const auto pages = gpu.readPages();
         ASSERT_TRUE(pages) << pages.error().message;

@@ -13,11 +13,6 @@ using test::packOf;
 
 class RuntimeTest : public test::GpuTest {
    protected:
-    static Runtime runtimeOf(const Pack& pack, const RuntimeOptions& options = {}) {
-        auto runtime = Runtime::create(device().context(), pack, options);
-        if (!runtime) throw std::runtime_error(runtime.error().message);
-        return std::move(*runtime);
-    }
     static void expectEqualPages(Runtime& gpu, const CpuRuntime& cpu) {
         const auto pages = gpu.readPages();
         ASSERT_TRUE(pages) << pages.error().message;

@@ -6,26 +6,22 @@
 #include <spirv/sample_lightmap_comp.h>
 
 #include "gpu_fixture.h"
-#include "random_pack.h"
+#include "pages.h"
 
 #include <cstring>
 
 namespace dimmer {
 namespace {
 
-struct Query {
+using test::valueOf;
+
+struct LightmapQuery {
     std::array<float, 4> uv_page;  // w: exposure
     std::array<float, 4> normal_tangent;
 };
 
 void check(VkResult result) {
     if (result != VK_SUCCESS) throw std::runtime_error("a Vulkan call of the test failed");
-}
-
-template <class T>
-T valueOf(Expected<T> expected) {
-    if (!expected) throw std::runtime_error(expected.error().message);
-    return std::move(*expected);
 }
 
 // The kernel sample_lightmap.comp over a lightmap.
@@ -35,8 +31,8 @@ class Sampler {
         createPipeline();
     }
 
-    std::vector<std::array<float, 4>> sample(const std::vector<Query>& queries) {
-        const GpuBuffer input = valueOf(createBuffer(vulkan_, queries.size() * sizeof(Query),
+    std::vector<std::array<float, 4>> sample(const std::vector<LightmapQuery>& queries) {
+        const GpuBuffer input = valueOf(createBuffer(vulkan_, queries.size() * sizeof(LightmapQuery),
                                                      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Upload));
         std::vector<std::array<float, 4>> results(queries.size());
         const GpuBuffer output = valueOf(createBuffer(vulkan_, results.size() * sizeof(results[0]),
@@ -184,7 +180,7 @@ class SampleGlslTest : public test::GpuTest {
         const Runtime gpu = valueOf(Runtime::create(device().context(), pack));
         constexpr std::array<std::array<float, 3>, 5> normals{
             {{0, 0, 1}, {0.6f, 0, 0.8f}, {0, -0.8f, 0.6f}, {-0.48f, 0.6f, 0.64f}, {0.6f, 0.64f, -0.48f}}};
-        std::vector<Query> queries;
+        std::vector<LightmapQuery> queries;
         for (float page : {0.0f, 1.0f})
             for (const auto& uv : uvs)
                 for (const auto& n : normals)
