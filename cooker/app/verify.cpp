@@ -3,6 +3,7 @@
 #include <pipeline/heat_map.h>
 #include <pipeline/profile.h>
 #include <pipeline/verify.h>
+#include <write/pack_writer.h>
 
 #include <fmt/format.h>
 
@@ -12,7 +13,7 @@ namespace dimmer::cook {
 namespace {
 
 struct VerifyArguments {
-    std::string level, pack, json, heatmap;
+    std::string level, pack, json, heatmap, csv;
     VerifyOptions options;
     double max_error = -1;  // below 0: no limit
     bool no_sets = false;
@@ -94,6 +95,18 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     return j;
 }
 
+// What was measured at every point of the surface, for tools that look further.
+Expected<void> writeCsv(const VerifyReport& report, const std::string& file) {
+    std::string text = "x,y,z,nx,ny,nz,lux,reference_lux,reference_error_lux\n";
+    for (size_t i = 0; i < report.points.size(); ++i) {
+        const glm::vec3 p = report.points[i].position_m, n = report.points[i].frame.normal;
+        const LightPair& l = report.surface_pairs[i];
+        text += fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.3g}\n", p.x, p.y, p.z, n.x, n.y, n.z, l.value_lux,
+                            l.reference_lux, l.reference_error_lux);
+    }
+    return writeFileAtomically(file, std::as_bytes(std::span(text)));
+}
+
 int run(VerifyArguments a) {
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
@@ -105,6 +118,8 @@ int run(VerifyArguments a) {
     if (!report) return reportError(report.error());
     if (!a.heatmap.empty())
         if (auto ok = writeHeatMaps(a.heatmap, *pack, *report, a.options.state); !ok) return reportError(ok.error());
+    if (!a.csv.empty())
+        if (auto ok = writeCsv(*report, a.csv); !ok) return reportError(ok.error());
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*report, a.options), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printReport(*report, a.options);
@@ -139,6 +154,8 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
         ->check(CLI::NonNegativeNumber);
     c->add_option("--heatmap", a->heatmap,
                   "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
+    c->add_option("--csv", a->csv,
+                  "write the light at every point there: the pack's and the reference's luminance, lux");
     c->add_option("--json", a->json, "write the report there; - for stdout");
     c->footer("Example: dimmer verify house.gltf house.dimmer --state \"alarm=0\" --max-error 0.1 --heatmap error");
     c->callback([a, &exit_code] { exit_code = run(*a); });

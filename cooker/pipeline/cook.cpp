@@ -2,6 +2,7 @@
 
 #include <bake/bake.h>
 #include <bake/buried_lights.h>
+#include <bake/overlap.h>
 #include <bake/sampling.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
@@ -275,6 +276,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         const BakeSettings settings = bakeSettings(profile, *quality, scene);
         baked = bakeWithCache(level, settings, scales, progress, cache);
         multiplyByScales(scales, baked);
+        limitOverlap(baked, profile.overlap_max);
         if (losses) *losses = LossTable(baked, texels, settings.group_thresholds);
     }
     stats.rays = baked.rays;

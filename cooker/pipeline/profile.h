@@ -37,6 +37,7 @@ struct Profile {
     ColorFormat color_format = ColorFormat::E5B9G9R9;
     DirectionModel direction_model = DirectionModel::Ahd;
     float threshold = 0.01f;                      // activity, see BakeSettings
+    uint32_t overlap_max = 0;                     // contributions per receiver, see limitOverlap; 0: no limit
     std::map<std::string, float> set_thresholds;  // for single light sets, by name
     uint32_t probes_max = 20000;                  // of the global grid; 0: no grid
     float global_min_spacing_m = 0.3f;            // between them

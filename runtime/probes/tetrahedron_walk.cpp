@@ -78,6 +78,20 @@ bool walk(const GlobalGrid& grid, const Vec3& point, uint32_t steps_max, GridPla
     }
 }
 
+// To the neighbour that the point lies deeper in; of two equal ones, to the first.
+void settle(const GlobalGrid& grid, const Vec3& point, GridPlace& place) {
+    for (uint32_t step = 0; step < settle_steps_max; ++step) {
+        const size_t face = smallest(place.barycentric);
+        const float depth = place.barycentric[face];
+        const uint32_t next = grid.tetrahedra[place.tetrahedron].neighbours[face];
+        if (!(depth < inside_tolerance) || next == no_tetrahedron) return;
+        const std::array<float, 4> there = barycentricOf(grid, next, point);
+        const float next_depth = there[smallest(there)];
+        if (!(next_depth > depth || (next_depth == depth && next < place.tetrahedron))) return;
+        place = {next, there};
+    }
+}
+
 }  // namespace
 
 GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint) {
@@ -89,6 +103,7 @@ GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t 
         place.tetrahedron = startOf(grid, point);
         walk(grid, point, walk_steps_max, place);
     }
+    settle(grid, point, place);
     place.barycentric = clampWeights(place.barycentric);
     return place;
 }

@@ -155,6 +155,34 @@ TEST(Tetrahedra, AreDelaunay) {
     }
 }
 
+// A thing's light must not depend on the way that it came. Places on faces and next to them, where two tetrahedra take
+// a point in.
+TEST(TetrahedronWalk, EndsInOnePlaceWhateverTheHint) {
+    Random random(8);
+    std::vector<glm::vec3> points(300);
+    for (auto& p : points) p = {uniform(random, -4, 4), uniform(random, 0, 3), uniform(random, -4, 4)};
+    const GlobalGrid grid = gridOf(points);
+    const auto last = static_cast<uint32_t>(grid.tetrahedra.size()) - 1;
+    for (int i = 0; i < 20000; ++i) {
+        const Tetrahedron& t = grid.tetrahedra[pick(random, 0, last)];
+        std::array<double, 4> shares{};  // well inside a face, and a little off it
+        double sum = 0;
+        for (size_t k = 1; k < 4; ++k) sum += shares[k] = static_cast<double>(uniform(random, 0.1f, 1));
+        for (size_t k = 1; k < 4; ++k) shares[k] /= sum;
+        const double off = i % 2 ? 0 : static_cast<double>(std::exp2(uniform(random, -26, -12)));
+        shares[0] = i % 4 ? off : -off;
+        glm::dvec3 p(0);
+        for (size_t k = 0; k < 4; ++k) p += shares[k] * at(grid, t.probes[k]);
+        const std::array<float, 3> point = {static_cast<float>(p.x), static_cast<float>(p.y), static_cast<float>(p.z)};
+        const GridPlace place = locate(grid, point);
+        for (const uint32_t hint : {t.neighbours[0], pick(random, 0, last), pick(random, 0, last)}) {
+            const GridPlace again = locate(grid, point, hint);
+            ASSERT_EQ(again.tetrahedron, place.tetrahedron) << i;
+            ASSERT_EQ(again.barycentric, place.barycentric) << i;
+        }
+    }
+}
+
 TEST(TetrahedronWalk, FindsWhatBruteForceFinds) {
     Random random(7);
     std::vector<glm::vec3> points(300);

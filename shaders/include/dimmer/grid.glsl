@@ -27,6 +27,7 @@ DimmerProbe dimmer_probe_load(uint number) {
 const uint dimmer_no_tetrahedron = 0xffffffffu;
 const uint dimmer_hinted_steps_max = 32u;  // these as in tetrahedron_walk.h
 const uint dimmer_walk_steps_max = 1024u;
+const uint dimmer_settle_steps_max = 4u;
 const float dimmer_inside_tolerance = 1e-4;
 const float dimmer_visibility_slope = 8.0;
 const float dimmer_visible_weight_min = 1e-5;
@@ -67,21 +68,35 @@ vec4 dimmer_barycentric(uint tetrahedron, vec3 point) {
     return shares;
 }
 
+uint dimmer_smallest(vec4 values) {
+    uint least = 0u;
+    for (uint i = 1u; i < 4u; ++i)
+        if (values[i] < values[least]) least = i;
+    return least;
+}
+
 bool dimmer_walk(vec3 point, uint steps_max, inout DimmerGridPlace place) {
     for (uint step = 0u;; ++step) {
         place.barycentric = dimmer_barycentric(place.tetrahedron, point);
-        uint face = 0u;
-        float least = place.barycentric.x;
-        for (uint i = 1u; i < 4u; ++i)
-            if (place.barycentric[i] < least) {
-                face = i;
-                least = place.barycentric[i];
-            }
-        if (!(least < -dimmer_inside_tolerance)) return true;
+        uint face = dimmer_smallest(place.barycentric);
+        if (!(place.barycentric[face] < -dimmer_inside_tolerance)) return true;
         uint next = dimmer_tetrahedron_part(place.tetrahedron, 1u)[face];
         if (next == dimmer_no_tetrahedron) return true;
         if (step == steps_max) return false;
         place.tetrahedron = next;
+    }
+}
+
+void dimmer_settle(vec3 point, inout DimmerGridPlace place) {
+    for (uint step = 0u; step < dimmer_settle_steps_max; ++step) {
+        uint face = dimmer_smallest(place.barycentric);
+        float depth = place.barycentric[face];
+        uint next = dimmer_tetrahedron_part(place.tetrahedron, 1u)[face];
+        if (!(depth < dimmer_inside_tolerance) || next == dimmer_no_tetrahedron) return;
+        vec4 there = dimmer_barycentric(next, point);
+        float next_depth = there[dimmer_smallest(there)];
+        if (!(next_depth > depth || (next_depth == depth && next < place.tetrahedron))) return;
+        place = DimmerGridPlace(next, there);
     }
 }
 
@@ -106,6 +121,7 @@ DimmerGridPlace dimmer_locate(vec3 point, uint hint) {
         place.tetrahedron = dimmer_start(point, low, high);
         dimmer_walk(point, dimmer_walk_steps_max, place);
     }
+    dimmer_settle(point, place);
     precise vec4 weights;
     for (int i = 0; i < 4; ++i) {
         float w = place.barycentric[i];

@@ -1,0 +1,250 @@
+"""What each percent of error costs in microseconds and megabytes: every setting that trades one for the other.
+
+Called by scripts/bench pareto. What was measured is kept in out/pareto and never measured again; each run adds what is
+missing, those configurations first that differ from a profile's default in one setting. The report is
+out/pareto/pareto.html. Real levels are looked for in ../shared/levels, their irradiance by an independent path tracer in
+../shared/truth; the house is held against the cooker's reference path tracer.
+"""
+import argparse
+import csv
+import itertools
+import json
+import pathlib
+import resource
+import statistics
+import sys
+import time
+
+from bench_bake import HOUSE, LEVELS, ROOT, TRUTH, dimmer, luminance, refresh, table
+from pareto_report import front, report
+
+OUT = ROOT / "out/pareto"
+AXES = {
+    "lightmaps.color": ["e5b9g9r9", "r11g11b10f"],
+    "lightmaps.model": ["ahd", "linear"],
+    "records.threshold": [0.001, 0.003, 0.01, 0.03, 0.1],
+    "lightmaps.texels_per_metre": [1, 2, 4, 8],
+    "records.overlap_max": [4, 8, 16, 0],
+}
+# The grid's density touches no texel: it is one axis of its own, from the default.
+GRID_AXIS = [100, 300, 1000, 3000]
+HOUSE_STATES = {"all on": "", "all off": "all=0", "alarm and desk": "all=0,alarm=1/0.2/0.2,desk=0.5",
+                "half, den open": "all=0.5,door:den=1", "front open": "all=0,door:front=1"}
+FLOOR_SHARE = 0.01  # of the mean light with all sets on, as `dimmer verify` has it
+
+
+def cpu_seconds():
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def profiles():
+    """The shipped profiles as {name: configuration}."""
+    def load(name):
+        own = json.loads((ROOT / f"profiles/{name}.json").read_text())
+        base = load(own["extends"]) if "extends" in own else {}
+        flat = {f"{group}.{key}": value for group, values in own.items() if isinstance(values, dict)
+                for key, value in values.items()}
+        return base | flat
+    found = {}
+    for path in sorted((ROOT / "profiles").glob("*.json")):
+        if path.stem != "schema":
+            settings = load(path.stem)
+            found[path.stem] = {key: settings.get(key, 0) for key in AXES}
+    return found
+
+
+def key_of(configuration):
+    return " ".join(f"{k.split('.')[1]}={configuration[k]}" for k in sorted(configuration))
+
+
+def configurations():
+    """Defaults first, then what differs from one in one setting, then all the others."""
+    defaults = list(profiles().values())
+    near = [d | {axis: value} for d in defaults for axis, values in AXES.items() for value in values]
+    every = [dict(zip(AXES, values)) for values in itertools.product(*AXES.values())]
+    # Configurations of one bake follow each other, the cheap ones first.
+    every.sort(key=lambda c: (c["lightmaps.texels_per_metre"], -c["records.threshold"]))
+    unique = {key_of(c): c for c in defaults + near + every}
+    return list(unique.values())
+
+
+class Level:
+    """A level with its truth: per state, points and luminance."""
+
+    def __init__(self, name, quality):
+        self.name, self.quality = name, quality
+        self.path = HOUSE if name == "house" else LEVELS / f"{name}.glb"
+        self.folder = OUT / f"{name}_{quality}"
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.results_file = self.folder / "results.json"
+        self.results = json.loads(self.results_file.read_text()) if self.results_file.exists() else {}
+        self.cache = self.folder / "cache"
+
+    def keep(self, key, figures):
+        self.results[key] = figures
+        partial = self.results_file.with_suffix(".part")
+        partial.write_text(json.dumps(self.results, indent=1))
+        partial.replace(self.results_file)
+
+    def truth(self):
+        """{state text: (points file, luminances)}, made once."""
+        if self.name != "house":
+            states = list(json.loads((TRUTH / f"{self.name}.json").read_text())["states"].items())[:5]
+            points = TRUTH / f"{self.name}.surface.points.csv"
+            return {text: (points, read_truth(TRUTH / f"{self.name}.surface.{state}.csv")) for state, text in states}
+        found = {}
+        pack = self.folder / "truth.dimmer"
+        for number, text in enumerate(HOUSE_STATES.values()):
+            file = self.folder / f"truth_{number}.csv"
+            if not file.exists():
+                if not pack.exists():
+                    dimmer("cook", self.path, "-o", pack, "--quality", "draft", "--set", "grids.probes_max=0",
+                           "--cache", self.cache)
+                dimmer("verify", self.path, pack, "--no-sets", "--points", 300, "--state", text, "--csv", file,
+                       "--seed", 1 + number)
+            rows = list(csv.DictReader(file.open()))
+            points = self.folder / f"points_{number}.csv"
+            points.write_text("x,y,z,nx,ny,nz\n" + "".join(
+                ",".join(r[c] for c in ("x", "y", "z", "nx", "ny", "nz")) + "\n" for r in rows))
+            found[text] = (points, [float(r["reference_lux"]) for r in rows])
+        return found
+
+
+def read_truth(file):
+    return [luminance([float(r[c]) for c in ("Er", "Eg", "Eb")]) for r in csv.DictReader(file.open())]
+
+
+def errors(pack, truth, source="surface"):
+    """Relative errors over all states, by the definition of docs/measurements.md."""
+    floor = FLOOR_SHARE * statistics.fmean(truth[""][1])
+    found = []
+    for text, (points, expected) in truth.items():
+        state = ["--state", text] if text else []
+        lines = dimmer("sample", pack, "--points", points, "--from", source, *state).splitlines()
+        for row, reference in zip(csv.DictReader(lines), expected):
+            value = luminance([float(row[c]) for c in ("Er", "Eg", "Eb")])
+            if value == value:  # no surface there: nan
+                found.append(abs(value - reference) / (reference + floor))
+    found.sort()
+    return statistics.fmean(found), found[int(0.95 * len(found))]
+
+
+def measure(level, configuration, truth):
+    pack = level.folder / "pack.dimmer"
+    before = cpu_seconds()
+    settings = itertools.chain.from_iterable(("--set", f"{k}={v}") for k, v in configuration.items())
+    dimmer("cook", level.path, "-o", pack, "--quality", level.quality, "--set", "grids.probes_max=0", "--set",
+           "budgets.total=0", "--set", "budgets.dynamic=0", "--cache", level.cache, *settings)
+    seconds = cpu_seconds() - before
+    mean, p95 = errors(pack, truth)
+    bench = json.loads(dimmer("bench", pack, "--frames", 5, "--only", "all sets changed", "--json", "-"))
+    update = bench["cases"][0]
+    clock = update["process_us" if bench["clock"] == "process" else "gpu_us"]
+    size = json.loads(dimmer("inspect", pack, "--json", "-"))
+    return {"settings": configuration, "mean": mean, "p95": p95, "update_us": clock["median"],
+            "roof": update.get("efficiency", 0), "bytes": size["bytes"]["device"], "file_bytes": size["bytes"]["file"],
+            "cook_s": seconds, "device": bench["device"]}
+
+
+def with_bake(level, figures):
+    """A cook that finds its bake in the cache costs what the first with that bake did."""
+    of_bake = {}
+    for f in figures.values():
+        bake = (f["settings"]["lightmaps.texels_per_metre"], f["settings"]["records.threshold"])
+        of_bake[bake] = max(of_bake.get(bake, 0), f["cook_s"])
+    for f in figures.values():
+        f["bake_s"] = of_bake[(f["settings"]["lightmaps.texels_per_metre"], f["settings"]["records.threshold"])]
+    return figures
+
+
+def measure_grids(level):
+    """Error at free points against the number of probes, from the desktop's default."""
+    if level.name == "house":
+        return
+    states = list(json.loads((TRUTH / f"{level.name}.json").read_text())["states"].items())[:5]
+    points = TRUTH / f"{level.name}.free.points.csv"
+    truth = {text: (points, read_truth(TRUTH / f"{level.name}.free.{state}.csv")) for state, text in states}
+    for probes in GRID_AXIS:
+        key = f"grid probes_max={probes}"
+        if key in level.results:
+            continue
+        pack = level.folder / "grid.dimmer"
+        before = cpu_seconds()
+        dimmer("cook", level.path, "-o", pack, "--quality", level.quality, "--set", f"grids.probes_max={probes}",
+               "--set", "grids.global=on", "--cache", level.cache)
+        seconds = cpu_seconds() - before
+        mean, p95 = errors(pack, truth, "grid")
+        size = json.loads(dimmer("inspect", pack, "--json", "-"))
+        level.keep(key, {"grid": probes, "probes": size["receivers"]["global_probes"], "mean": mean, "p95": p95,
+                         "bytes": size["bytes"].get("global_grid", 0), "cook_s": seconds})
+        print(f"  {level.name}: {key}: mean {100 * mean:.1f} %", flush=True)
+
+
+def measure_level(level, deadline):
+    truth = level.truth()
+    missing = [c for c in configurations() if key_of(c) not in level.results]
+    begin = time.monotonic()
+    for done, configuration in enumerate(missing):
+        if time.monotonic() > deadline:
+            print(f"  {level.name}: {len(missing) - done} configurations left for the next run")
+            return
+        figures = measure(level, configuration, truth)
+        level.keep(key_of(configuration), figures)
+        left = (time.monotonic() - begin) / (done + 1) * (len(missing) - done - 1)
+        print(f"  {level.name} {done + 1}/{len(missing)}, {left / 60:.0f} min left: {key_of(configuration)}: "
+              f"{100 * figures['mean']:.2f} %, {figures['update_us']:.0f} us, {figures['bytes'] / 1e6:.2f} MB", flush=True)
+
+
+def lightmap_results(level):
+    return with_bake(level, {k: f for k, f in level.results.items() if "settings" in f})
+
+
+def front_table(levels):
+    shipped = {key_of(c): name for name, c in reversed(profiles().items())}
+    rows = []
+    for level in levels:
+        figures = lightmap_results(level)
+        on_time = front(figures, "update_us")
+        on_bytes = front(figures, "bytes")
+        for key in sorted(set(on_time) | set(on_bytes) | (set(shipped) & set(figures)),
+                          key=lambda k: figures[k]["mean"]):
+            f = figures[key]
+            of = [name for name, keys in (("time", on_time), ("bytes", on_bytes)) if key in keys]
+            rows.append([level.name, key, f"{100 * f['mean']:.2f}", f"{100 * f['p95']:.1f}", f"{f['update_us']:.0f}",
+                         f"{f['roof']:.2f}", f"{f['bytes'] / 1e6:.2f}", f"{f['bake_s']:.1f}", " and ".join(of) or "none",
+                         shipped.get(key, "")])
+    return table(["level", "settings", "mean %", "p95 %", "update us", "of the roof", "MB", "cook CPU s", "front",
+                  "default of"], rows)
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="scripts/bench pareto", description=__doc__.splitlines()[0])
+    parser.add_argument("--levels", nargs="*", default=["two_rooms", "house", "lq_old_start", "lq_e2m2", "lq_e2m3"])
+    parser.add_argument("--quality", default="draft", choices=["draft", "preview", "final"])
+    parser.add_argument("--minutes", type=float, default=60, help="end after so long; the next run goes on from there")
+    parser.add_argument("--report-only", action="store_true", help="from what was measured before")
+    options = parser.parse_args()
+    names = [n for n in options.levels if n == "house" or ((LEVELS / f"{n}.glb").exists() and TRUTH.exists())]
+    for name in sorted(set(options.levels) - set(names)):
+        print(f"{name}: not measured: it is expected in {LEVELS}", file=sys.stderr)
+    levels = [Level(name, options.quality) for name in names]
+    if not options.report_only:
+        begin = time.monotonic()
+        for number, level in enumerate(levels):
+            share = (number + 1) / len(levels)
+            measure_level(level, begin + 60 * options.minutes * share)
+            measure_grids(level)
+    levels = [level for level in levels if lightmap_results(level)]
+    page = OUT / "pareto.html"
+    page.write_text(report([(level.name, options.quality, lightmap_results(level),
+                             [f for f in level.results.values() if "grid" in f]) for level in levels],
+                           {name: key_of(c) for name, c in profiles().items()}))
+    counts = ", ".join(f"{level.name} {len(lightmap_results(level))}" for level in levels)
+    refresh("pareto", f"`scripts/bench pareto --quality {options.quality}`; configurations measured, of "
+            f"{len(configurations())} each: {counts}\n\n" + front_table(levels))
+    print(f"Report: {page}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,135 @@
+"""One HTML page, no network: error against update time, memory and cook time, with the fronts; see bench_pareto.py."""
+import html
+import math
+
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 640, 400, 56, 44, 16, 16
+DENSITY_COLOURS = {1: "#c9b458", 2: "#5aa469", 4: "#3b7dd8", 8: "#8e44ad"}
+PLOTS = [("update_us", "update of all light sets, microseconds"), ("bytes", "device memory, MB"),
+         ("bake_s", "cook, CPU seconds")]
+STYLE = """
+:root { color-scheme: light dark; --ink: #222; --paper: #fff; --faint: #8886; }
+@media (prefers-color-scheme: dark) { :root { --ink: #ddd; --paper: #181a1c; } }
+body { font: 16px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--paper); margin: 0 auto;
+       padding: 1rem; max-width: 1320px; }
+figure { margin: 0 0 1.5rem; } figcaption { font-weight: 600; margin-bottom: .3rem; }
+.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 400px), 1fr)); gap: 1rem; }
+svg { width: 100%; height: auto; display: block; } svg text { fill: var(--ink); font-size: 13px; }
+.axis { stroke: var(--ink); } .line { stroke: var(--faint); } .front { fill: none; stroke: #d33; stroke-width: 2; }
+circle { fill-opacity: .55; } circle:hover { stroke: var(--ink); stroke-width: 2; fill-opacity: 1; }
+.default { fill: none; stroke: var(--ink); stroke-width: 2.5; }
+.key span { display: inline-block; margin-right: 1.2em; } .key i { display: inline-block; width: .8em; height: .8em;
+  border-radius: 50%; margin-right: .35em; }
+table { border-collapse: collapse; } td, th { padding: .15rem .7rem .15rem 0; text-align: right; }
+td:first-child, th:first-child { text-align: left; } .scroll { overflow-x: auto; }
+"""
+
+
+def front(figures, cost):
+    """Keys that no other beats in both mean error and cost."""
+    kept, best = [], math.inf
+    for key, f in sorted(figures.items(), key=lambda item: (item[1][cost], item[1]["mean"], item[0])):
+        if f["mean"] < best:
+            kept.append(key)
+            best = f["mean"]
+    return kept
+
+
+def above_front(figures, key, cost):
+    """How much more error than the front's best at no more cost, as a share of that error."""
+    least = min(f["mean"] for f in figures.values() if f[cost] <= figures[key][cost])
+    return figures[key]["mean"] / least - 1
+
+
+def ticks(low, high):
+    """1, 2, 5 times powers of ten within a range."""
+    found = []
+    for power in range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1):
+        found += [m * 10.0**power for m in (1, 2, 5) if low <= m * 10.0**power <= high]
+    return found
+
+
+def scatter(figures, cost, label, defaults):
+    scale = 1e-6 if cost == "bytes" else 1
+    xs = [max(f[cost] * scale, 1e-6) for f in figures.values()]
+    ys = [100 * f["mean"] for f in figures.values()]
+    x0, x1 = min(xs) * 0.9, max(xs) * 1.1
+    y0, y1 = min(ys) * 0.93, max(ys) * 1.07
+
+    def x(v):
+        return LEFT + (WIDTH - LEFT - RIGHT) * math.log(max(v, 1e-6) / x0) / math.log(x1 / x0)
+
+    def y(v):
+        return HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * math.log(v / y0) / math.log(y1 / y0)
+
+    out = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="mean error against {label}">']
+    for t in ticks(x0, x1):
+        out.append(f'<line class="line" x1="{x(t):.1f}" x2="{x(t):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
+                   f'<text x="{x(t):.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">{t:g}</text>')
+    for t in ticks(y0, y1):
+        out.append(f'<line class="line" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(t):.1f}" y2="{y(t):.1f}"/>'
+                   f'<text x="{LEFT - 6}" y="{y(t) + 4:.1f}" text-anchor="end">{t:g}</text>')
+    out.append(f'<text x="{(LEFT + WIDTH) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{label}</text>'
+               f'<text transform="translate(14 {HEIGHT / 2}) rotate(-90)" text-anchor="middle">mean error, %</text>')
+    for key, f in figures.items():
+        colour = DENSITY_COLOURS.get(f["settings"]["lightmaps.texels_per_metre"], "#777")
+        lines = [f"{k.split('.')[1]} {v}" for k, v in f["settings"].items()]
+        lines += [f"mean {100 * f['mean']:.2f} %, 95th percentile {100 * f['p95']:.1f} %",
+                  f"{f['update_us']:.0f} us ({f['roof']:.2f} of the roof), {f['bytes'] / 1e6:.2f} MB, "
+                  f"{f['bake_s']:.1f} CPU s"]
+        out.append(f'<circle cx="{x(f[cost] * scale):.1f}" cy="{y(100 * f["mean"]):.1f}" r="4" fill="{colour}">'
+                   f"<title>{html.escape(chr(10).join(lines))}</title></circle>")
+    if cost != "bake_s":
+        points = " ".join(f"{x(figures[k][cost] * scale):.1f},{y(100 * figures[k]['mean']):.1f}"
+                          for k in front(figures, cost))
+        out.append(f'<polyline class="front" points="{points}"/>')
+    places = {}
+    for name, key in defaults.items():
+        if key in figures:
+            places.setdefault(key, []).append(name)
+    for key, names in places.items():
+        cx, cy = x(figures[key][cost] * scale), y(100 * figures[key]["mean"])
+        anchor = "end" if cx > WIDTH * 0.6 else "start"
+        offset = -10 if anchor == "end" else 10
+        out.append(f'<circle class="default" cx="{cx:.1f}" cy="{cy:.1f}" r="7"/>'
+                   f'<text x="{cx + offset:.1f}" y="{cy - 8:.1f}" text-anchor="{anchor}">{", ".join(names)}</text>')
+    return "\n".join(out + ["</svg>"])
+
+
+def defaults_table(figures, defaults):
+    rows = ["<tr><th>profile<th>mean %<th>above the front of update time<th>above the front of memory</tr>"]
+    for name, key in defaults.items():
+        if key in figures:
+            rows.append(f"<tr><td>{name}<td>{100 * figures[key]['mean']:.2f}"
+                        f"<td>{100 * above_front(figures, key, 'update_us'):.0f} %"
+                        f"<td>{100 * above_front(figures, key, 'bytes'):.0f} %</tr>")
+    return f"<div class=scroll><table>{''.join(rows)}</table></div>"
+
+
+def grid_table(grids):
+    if not grids:
+        return ""
+    rows = ["<tr><th>probes<th>mean %<th>95th percentile %<th>kB<th>cook, CPU s</tr>"]
+    rows += [f"<tr><td>{g['probes']}<td>{100 * g['mean']:.1f}<td>{100 * g['p95']:.0f}<td>{g['bytes'] / 1e3:.0f}"
+             f"<td>{g['cook_s']:.1f}</tr>" for g in sorted(grids, key=lambda g: g["probes"])]
+    return f"<h3>Light grid, at free points</h3><div class=scroll><table>{''.join(rows)}</table></div>"
+
+
+def report(levels, defaults):
+    """`levels`: (name, quality, lightmap figures, grid figures) each; `defaults`: profile -> key of its settings."""
+    body = ["<h1>Run time against error</h1>",
+            "<p>Each point is a level cooked with other settings: hover, or touch, for which. The red line joins those "
+            "that no other beats in both; circles mark what the shipped profiles set. Mean relative error over five "
+            "states; both axes are logarithmic.</p>",
+            '<p class="key">' + "".join(f'<span><i style="background:{c}"></i>{d} texels a metre</span>'
+                                        for d, c in DENSITY_COLOURS.items()) + "</p>"]
+    for name, quality, figures, grids in levels:
+        device = next(iter(figures.values()))["device"]
+        body.append(f"<h2>{html.escape(name)}, {quality}</h2><p>{len(figures)} configurations; update on "
+                    f"{html.escape(device)}</p><div class=plots>")
+        for cost, label in PLOTS:
+            body.append(f"<figure><figcaption>Error against {label.split(',')[0]}</figcaption>"
+                        f"{scatter(figures, cost, label, defaults)}</figure>")
+        body.append(f"</div>{defaults_table(figures, defaults)}{grid_table(grids)}")
+    return ("<!doctype html><html lang=en><meta charset=utf-8><title>Run time against error</title>"
+            '<meta name=viewport content="width=device-width, initial-scale=1">'
+            f"<style>{STYLE}</style><body>{chr(10).join(body)}</body></html>\n")
