@@ -153,9 +153,10 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"lightmaps.model", &p.direction_model, 0, 0,
          "how irradiance falls off over normals: ahd is better where one lamp rules, linear where many mix"});
     list.push_back({"records.threshold", &p.threshold, 0, 1, threshold_what});
-    list.push_back({"records.overlap_max", &p.overlap_max, 0, 4096,
-                    "contributions that one texel or probe holds at most, the brightest there; 0: no limit. Bounds what "
-                    "the worst texel of an update costs"});
+    list.push_back(
+        {"records.overlap_max", &p.overlap_max, 0, 4096,
+         "contributions that one texel or probe holds at most, the brightest there; 0: no limit. Bounds what "
+         "the worst texel of an update costs"});
     list.push_back({"grids.probes_max", &p.probes_max, 0, 1 << 20,
                     "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. One per cubic "
                     "metre of open space is never exceeded"});
