@@ -5,6 +5,8 @@
 #include <gpu/vk_struct.h>
 #include <spirv/level_frag.h>
 #include <spirv/level_vert.h>
+#include <spirv/model_frag.h>
+#include <spirv/model_vert.h>
 #include <spirv/sphere_frag.h>
 #include <spirv/sphere_vert.h>
 
@@ -167,6 +169,25 @@ Expected<PipelineHandle> createLevelPipeline(VkDevice device, VkPipelineLayout l
     input.vertexAttributeDescriptionCount = std::size(attributes);
     input.pVertexAttributeDescriptions = attributes;
     return createPipeline(device, {spirv::level_vert, spirv::level_frag}, input, layout, render_pass, extent);
+}
+
+Expected<PipelineHandle> createModelPipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
+                                             VkExtent2D extent) {
+    const VkVertexInputBindingDescription binding{0, sizeof(ModelVertex), VK_VERTEX_INPUT_RATE_VERTEX};
+    // Formats of three 16-bit numbers are optional in Vulkan, so the position's fourth is whatever follows it.
+    const VkVertexInputAttributeDescription attributes[] = {
+        {0, 0, VK_FORMAT_R16G16B16A16_UNORM, offsetof(ModelVertex, position)},
+        {1, 0, VK_FORMAT_R16G16_SNORM, offsetof(ModelVertex, normal)},
+        {2, 0, VK_FORMAT_R8G8B8A8_SNORM, offsetof(ModelVertex, transfer)},
+        {3, 0, VK_FORMAT_R8G8B8A8_SNORM, offsetof(ModelVertex, transfer) + 4},
+        {4, 0, VK_FORMAT_R8_SNORM, offsetof(ModelVertex, transfer) + 8}};
+    auto input =
+        vkStruct<VkPipelineVertexInputStateCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO);
+    input.vertexBindingDescriptionCount = 1;
+    input.pVertexBindingDescriptions = &binding;
+    input.vertexAttributeDescriptionCount = std::size(attributes);
+    input.pVertexAttributeDescriptions = attributes;
+    return createPipeline(device, {spirv::model_vert, spirv::model_frag}, input, layout, render_pass, extent);
 }
 
 Expected<PipelineHandle> createSpherePipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,

@@ -20,6 +20,9 @@ Expected<RenderPassHandle> createLevelRenderPass(VkDevice device);
 // Opaque, back faces culled, vertices as dimmer::MeshVertex, push constants as DrawConstants.
 Expected<PipelineHandle> createLevelPipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
                                              VkExtent2D extent);
+// The same with vertices as dimmer::ModelVertex, push constants as ModelConstants.
+Expected<PipelineHandle> createModelPipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
+                                             VkExtent2D extent);
 // The same without vertex buffers, push constants as SphereConstants.
 Expected<PipelineHandle> createSpherePipeline(VkDevice device, VkPipelineLayout layout, VkRenderPass render_pass,
                                               VkExtent2D extent);

@@ -17,7 +17,7 @@ constexpr int exit_done = 0, exit_fault = 1, exit_bad_input = 2;
 struct Arguments {
     std::string pack, script, out = "out/sample", size, camera;
     uint32_t frames = 0;
-    bool headless = false, validate = false;
+    bool headless = false, validate = false, no_self_visibility = false;
 };
 
 void declare(CLI::App& app, Arguments& arguments) {
@@ -33,6 +33,8 @@ void declare(CLI::App& app, Arguments& arguments) {
     app.add_option("--camera", arguments.camera,
                    "Name of the camera to begin with (default: the script's, else the level's first)");
     app.add_flag("--validate", arguments.validate, "Run under the Vulkan validation layers; exit 1 if they complain");
+    app.add_flag("--no-self-visibility", arguments.no_self_visibility,
+                 "Light models by their light grids alone, without their shadows on themselves");
     app.footer(
         "Example: dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
@@ -107,7 +109,8 @@ int run(const Arguments& arguments) {
     if (!pack) return report(pack.error());
     const auto script = prepareScript(arguments, *pack);
     if (!script) return report(script.error());
-    const auto played = playHeadless(*pack, *script, {arguments.pack, arguments.out, arguments.validate});
+    const auto played = playHeadless(
+        *pack, *script, {arguments.pack, arguments.out, arguments.validate, !arguments.no_self_visibility});
     if (!played) return report(played.error());
 
     fmt::print("{}", played->cost.table(played->device, played->driver));

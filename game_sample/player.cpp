@@ -4,6 +4,7 @@
 #include "exposure.h"
 #include "image_file.h"
 #include "level_renderer.h"
+#include "model_renderer.h"
 #include "progress.h"
 #include "timeline.h"
 
@@ -74,12 +75,13 @@ class Player {
    public:
     // `spheres` may be null where there are none to draw.
     Player(const Script& script, Runtime& lights, LevelRenderer& renderer, FrameCommands& commands, Balls& balls,
-           const SphereRenderer* spheres)
+           ModelRenderer& models, const SphereRenderer* spheres)
         : script_(script),
           lights_(lights),
           renderer_(renderer),
           commands_(commands),
           balls_(balls),
+          models_(models),
           sphere_renderer_(spheres),
           timeline_(script) {
         if (script.probe_radius_m > 0) probe_spheres_ = probeSpheres(lights.pack(), script.probe_radius_m);
@@ -92,6 +94,7 @@ class Player {
         if (!changes) return std::unexpected(changes.error());
         cost.changes = std::move(*changes);
         DIMMER_TRY(balls_.move(frame, lights_));
+        DIMMER_TRY(models_.move(frame / static_cast<double>(script_.fps), lights_));
 
         const auto commands = commands_.begin();
         if (!commands) return std::unexpected(commands.error());
@@ -99,10 +102,13 @@ class Player {
         auto spheres = balls_.spheres(lights_);
         if (!spheres) return std::unexpected(spheres.error());
         spheres->insert(spheres->end(), probe_spheres_.begin(), probe_spheres_.end());
+        Expected<void> drawn{};
         renderer_.record(*commands, timeline_.camera(), script_.sky_cd_m2, lights_,
                          [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
+                             drawn = models_.draw(pass, clip_from_world, lights_);
                              if (sphere_renderer_) sphere_renderer_->draw(pass, clip_from_world, *spheres);
                          });
+        DIMMER_TRY(drawn);
         DIMMER_TRY(commands_.submitAndWait());
 
         const auto stats = lights_.wait();  // the same update, now with its time on the GPU
@@ -119,6 +125,7 @@ class Player {
     LevelRenderer& renderer_;
     FrameCommands& commands_;
     Balls& balls_;
+    ModelRenderer& models_;
     const SphereRenderer* sphere_renderer_;
     std::vector<Sphere> probe_spheres_;
     Timeline timeline_;
@@ -173,7 +180,8 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
     if (!device) return std::unexpected(device.error());
     PlayResult result{{}, device->name(), device->driver(), {}};
     {
-        auto lights = Runtime::create(device->context(), pack, {.moving_probes_max = movingProbes(script)});
+        auto lights =
+            Runtime::create(device->context(), pack, {.moving_probes_max = movingProbes(script) + movingProbes(pack)});
         if (!lights) return std::unexpected(lights.error());
         auto renderer = LevelRenderer::create(device->context(), pack, lights->images(), {script.width, script.height});
         if (!renderer) return std::unexpected(renderer.error());
@@ -185,8 +193,12 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
         auto spheres = createSphereRenderer(device->context(), script, *lights, *renderer);
         if (!spheres) return std::unexpected(spheres.error());
 
+        auto models = ModelRenderer::create(device->context(), *lights, renderer->renderPass(),
+                                            {script.width, script.height}, options.self_visibility);
+        if (!models) return std::unexpected(models.error());
+
         DIMMER_TRY(rehearse(script, *lights, *balls));
-        Player player(script, *lights, *renderer, *commands, *balls, *spheres ? &**spheres : nullptr);
+        Player player(script, *lights, *renderer, *commands, *balls, *models, *spheres ? &**spheres : nullptr);
         AutoExposure eye(script.adaptation_s, script.fps);
         Progress progress("frames", script.frames);
         for (uint32_t frame = 0; frame < script.frames; ++frame) {

@@ -5,7 +5,7 @@ packages=(
     libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
     libglm-dev libembree-dev libtbb-dev libzstd-dev libxxhash-dev
     libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev libspdlog-dev
-    libtet1.5-dev
+    libtet1.5-dev libmeshoptimizer-dev
 )
 test_packages=(libgtest-dev libgmock-dev clang-format)
 

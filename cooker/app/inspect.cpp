@@ -102,12 +102,25 @@ std::vector<Flatness> worstTetrahedra(const GlobalGrid& grid, size_t count) {
     return all;
 }
 
+void printModels(const PackData& d) {
+    if (d.models.empty()) return;
+    size_t triangles = 0;
+    for (const ModelMesh& m : d.model_meshes) triangles += m.indices.size() / 3;
+    fmt::print("\nmodels: {}; {} meshes, {} triangles; {} local grids, {} probes, {}\n", d.models.size(),
+               d.model_meshes.size(), triangles, d.probes.local.size(),
+               d.probes.base.size() - d.probes.global.positions.size(), humanBytes(localGridBytes(d)));
+    fmt::print("{:<26} {:>12}   meshes\n", "model", "probes");
+    for (const PlacedModel& m : d.models)
+        fmt::print("{:<26} {:>12}   {}\n", m.node,
+                   m.local_grid ? fmt::format("{}", d.probes.local[*m.local_grid].probeCount()) : "moves",
+                   m.mesh_count);
+}
+
 void printGrid(const PackData& d, const PackCost& cost) {
     const GlobalGrid& grid = d.probes.global;
     if (grid.empty()) return;
-    fmt::print("\nglobal grid: {} probes, {} tetrahedra, {}; {} local grids, {} probes, {}\n", grid.positions.size(),
-               grid.tetrahedra.size(), humanBytes(cost.global_grid), d.probes.local.size(),
-               d.probes.base.size() - grid.positions.size(), humanBytes(localGridBytes(d)));
+    fmt::print("\nglobal grid: {} probes, {} tetrahedra, {}\n", grid.positions.size(), grid.tetrahedra.size(),
+               humanBytes(cost.global_grid));
     fmt::print("{:<26} {:>12}\n", "level of refinement", "probes");
     const auto levels = probesByLevel(grid);
     for (size_t n = 0; n < levels.size(); ++n) fmt::print("{:<26} {:>12}\n", n, levels[n]);
@@ -138,6 +151,8 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
         {"texels", texels}, {"local_probes", d.probes.base.size() - global_probes}, {"global_probes", global_probes}};
     j["probe_levels"] = probesByLevel(d.probes.global);
     j["tetrahedra"] = d.probes.global.tetrahedra.size();
+    j["models"] = d.models.size();
+    j["model_meshes"] = d.model_meshes.size();
     j["pages"] = nlohmann::ordered_json::array();
     for (uint32_t p = 0; p < d.page_count; ++p)
         j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
@@ -172,6 +187,7 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
         d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
     printGrid(d, cost);
+    printModels(d);
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,

@@ -32,6 +32,10 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
         row("grid", r.grid);
     else
         fmt::print("{:<22} the pack has none, or its places are black\n", "grid");
+    if (r.models.shadowed.points > 0) {
+        row("models", r.models.shadowed);
+        row("- without self-visibility", r.models.plain);
+    }
     fmt::print(
         "\nerror = |E - E_ref| / (E_ref + {:.4g} lux); tilted: normals within {:.0f} degrees of the surface's; "
         "grid: anywhere in the open\n",
@@ -72,6 +76,10 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     j["surface"] = toJson(r.surface);
     j["tilted"] = toJson(r.tilted);
     j["grid"] = toJson(r.grid);
+    if (r.models.shadowed.points > 0) {
+        j["models"] = toJson(r.models.shadowed);
+        j["models_without_self_visibility"] = toJson(r.models.plain);
+    }
     j["causes"] = r.causes;
     j["sets"] = nlohmann::ordered_json::array();
     for (const FormatError& f : r.formats)

@@ -6,6 +6,7 @@
 #include <bake/group_light.h>
 #include <bake/series.h>
 #include <probes/grid_bake.h>
+#include <probes/local_bake.h>
 
 #include <atomic>
 
@@ -75,6 +76,8 @@ FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
     if (std::ranges::count(turns.bake, 1) > 0) {
         baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress);
         baked.light = gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays);
+        baked.local_light =
+            bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays, baked.warnings);
     }
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
@@ -116,8 +119,9 @@ class Bake {
         if (std::ranges::count(turns_.follow, 1) > 0) followGroups();
         addGroups(found_, baked_);
         if (sites_) makeGrid();
-        for (size_t i = 0; i < baked_.grid.light.rows(); ++i)
-            for (const ProbeTermLight& l : baked_.grid.light.row(i)) ++baked_.reports[l.term].receivers;
+        for (const auto* probes : {&baked_.grid.light, &baked_.local_light})
+            for (size_t i = 0; i < probes->rows(); ++i)
+                for (const ProbeTermLight& l : probes->row(i)) ++baked_.reports[l.term].receivers;
         baked_.dependent_doors = dependentDoors(baked_.door_flux, settings_);
         if (baked_.bounces == settings_.bounces_max)
             baked_.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
@@ -127,7 +131,10 @@ class Bake {
    private:
     void findGroups() {
         for (uint32_t g = 0; store_ && g < groups_; ++g)
-            if (found_[g] = store_->find(g); found_[g]) turns_.bake[g] = 0;
+            if (found_[g] = store_->find(g); found_[g]) {
+                turns_.bake[g] = 0;
+                baked_.local_light = Sparse<ProbeTermLight>::Builder(found_[g]->local_light.rows()).finish();
+            }
         turns_.follow = turns_.bake;
     }
 
@@ -170,7 +177,7 @@ class Bake {
 
     void makeGrid() {
         if (std::ranges::count(sites_->asked(), 1) > 0) {
-            addRadiance(radiance_, paths_, texels_.size(), followed_.radiance);
+            addRadiance(radiance_, paths_, gatherer().receiverCount(), followed_.radiance);
             baked_.rays += sites_->trace(gatherer(), followed_.radiance, baked_.reports, settings_, progress_);
         }
         followed_ = {};

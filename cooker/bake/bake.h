@@ -104,6 +104,7 @@ struct Baked {
     uint64_t rays = 0;                // traced, not remembered
     std::vector<DoorFlux> door_flux;  // per light group
     BakedGrid grid;
+    Sparse<ProbeTermLight> local_light;     // per probe of localGrids() (models/scene_models.h), as in `light`
     std::vector<DoorPair> dependent_doors;  // whose loss is above the threshold, the largest first
     std::vector<std::string> warnings;
 };
@@ -125,8 +126,9 @@ struct SiteBlockLight {
 // All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
 // alone, so that a store can keep it.
 struct GroupLight {
-    Sparse<ReceiverLight> light;      // per receiver; `term` counts the group's own terms, variances are 0
-    std::vector<TermReport> reports;  // per term of the group
+    Sparse<ReceiverLight> light;         // per receiver; `term` counts the group's own terms, variances are 0
+    Sparse<ProbeTermLight> local_light;  // per probe of local grids, likewise
+    std::vector<TermReport> reports;     // per term of the group
     DoorFlux door_flux;
     uint32_t bounces = 0;
 };

@@ -36,7 +36,7 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
             if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
             ++traced;
             const float distance_m = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
-            forEachWay(rays, paths, from.condition, p.position_m, lit.towards_light, distance_m,
+            forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
                        [&](float passed, uint32_t path) {
                            const uint32_t term = paths.term(groupOf(light.light_set), path);
                            if (term == no_term) return;

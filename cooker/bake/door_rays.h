@@ -9,10 +9,10 @@ namespace dimmer::cook {
 
 // visit(share, path) for every way that light has from `origin` along `direction` over `distance_m`: the share of it
 // that passes, 0 to 1, while the doors stand as the path needs them. Ways that no kept path has are left out. `own`:
-// the condition under which the receiver is there.
-void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, glm::vec3 origin, glm::vec3 direction,
-                float distance_m, auto&& visit) {
-    const float passed = rays.transmittance(origin, direction, distance_m, Surfaces::Walls);
+// the condition under which the receiver is there; `ignored`: a model that is not.
+void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, uint32_t ignored, glm::vec3 origin,
+                glm::vec3 direction, float distance_m, auto&& visit) {
+    const float passed = rays.transmittance(origin, direction, distance_m, Surfaces::Walls, ignored);
     if (!(passed > 0)) return;
     if (!rays.anyLeaf()) return visit(passed, free_path);
     struct Way {

@@ -59,13 +59,16 @@ struct Gatherer::Ray {
 };
 
 TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
-    return point.face == no_face ? TangentFrame{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}} : unwrap_.frames[point.face];
+    if (point.face < unwrap_.frames.size()) return unwrap_.frames[point.face];
+    return point.face == no_face ? TangentFrame{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}} : receiverFrame(point.face);
 }
 
 glm::vec3 Gatherer::toTangent(const SamplePoint& point, glm::vec3 d) const {
     if (point.face == no_face) return d;
-    const TangentFrame& f = unwrap_.frames[point.face];
-    return {glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal)};
+    const auto in = [&](const TangentFrame& f) {
+        return glm::vec3(glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal));
+    };
+    return point.face < unwrap_.frames.size() ? in(unwrap_.frames[point.face]) : in(receiverFrame(point.face));
 }
 
 template <class Light>
@@ -97,7 +100,7 @@ DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
     DoorAim aim{guide, {}};
     for (const SamplePoint& p : from.points)
         aim.from_point.emplace_back(guides_.boxes(guide), p.position_m,
-                                    p.face == no_face ? glm::vec3(0) : unwrap_.frames[p.face].normal);
+                                    p.face == no_face ? glm::vec3(0) : frameOf(p).normal);
     return aim;
 }
 
@@ -138,7 +141,7 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
 // Traces a ray and takes what it finds.
 template <class Light>
 void Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
-    const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls);
+    const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored);
     const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
     if (path == no_path) return;
     if (hit)
@@ -198,6 +201,15 @@ uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m) const 
     return path;
 }
 
+uint32_t Gatherer::modelReceiverAt(const Hit& hit, uint32_t chance) const {
+    const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
+    if (triangle.model == no_model) return no_index;
+    if (hit.back && !rays_.scene().materials[triangle.material].double_sided) return no_index;
+    const uint32_t found = models_.pick(triangle.model, rays_.pointOn(hit.triangle, hit.u, hit.v),
+                                        hit.back ? -triangle.normal : triangle.normal, chance);
+    return found == no_index ? no_index : static_cast<uint32_t>(texels_.size()) + found;
+}
+
 // Takes the light of the surface at a ray's end.
 template <class Light>
 void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const {
@@ -212,7 +224,9 @@ void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const 
                                                    by_hit / (by_hit + by_area)),
                               ray.tangent);
     }
-    const uint32_t found = receiverOf(unwrap_, texels_, hit);
+    uint32_t found = receiverOf(unwrap_, texels_, hit);
+    if (found == no_index && !models_.empty())
+        found = modelReceiverAt(hit, hash(hash(ray.options.seed, ray.from.id), ray.options.first_ray + ray.i));
     if (found == no_index) return;
     if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
     if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
@@ -245,7 +259,7 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, T
         const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
         const float weight = Light::Intake::weight(d);
         const float by_ray = static_cast<float>(options.rays) * weight / Light::Intake::total;
-        forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, far_away_m,
+        forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
                        if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
                            sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), d);
@@ -282,11 +296,12 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(origin, s.direction);
             if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
+            if (from.ignored != no_model && rays_.triangles()[s.triangle].model == from.ignored) continue;
             const float weight = Light::Intake::weight(d), by_area = samples * s.pdf;
             const float by_hit = static_cast<float>(options.rays) * weight / Light::Intake::total;
             const uint32_t target = rays_.triangles()[s.triangle].condition;
-            forEachWay(rays_, paths_, from.condition, origin.position_m, s.direction, s.distance_m * shadow_end_share,
-                       [&](float passed, uint32_t path) {
+            forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
+                       s.distance_m * shadow_end_share, [&](float passed, uint32_t path) {
                            const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
                            if (term != no_term && sum.wants(term))
                                sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)), d);

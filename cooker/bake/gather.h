@@ -9,6 +9,7 @@
 #include <bake/sky.h>
 #include <bake/sparse_light.h>
 #include <charts/texels.h>
+#include <models/model_receivers.h>
 
 #include <array>
 #include <cmath>
@@ -101,6 +102,7 @@ struct GatherFrom {
     std::span<const SamplePoint> points;
     uint32_t id = 0;
     uint32_t condition = no_condition;  // under which the receiver is there: a leaf's
+    uint32_t ignored = no_model;        // a model that its rays pass through
 };
 
 // What the rays of a gather found, for going there again.
@@ -128,7 +130,8 @@ class Gatherer {
           emitters_(emitters),
           paths_(paths),
           sky_(rays.scene()),
-          guides_(rays) {
+          guides_(rays),
+          models_(rays) {
         for (uint32_t t = 0; t < paths.termCount(); ++t) guide_of_term_.push_back(guideOf(t));
     }
 
@@ -144,27 +147,46 @@ class Gatherer {
     // Of the term's one door; no_guide for the others.
     uint32_t guideOf(uint32_t term) const;
 
+    // Texels, then the receivers of models.
+    size_t receiverCount() const { return texels_.size() + models_.size(); }
+    float areaM2(size_t receiver) const {
+        return receiver < texels_.size() ? texels_.area_m2[receiver] : models_.areaM2(receiver - texels_.size());
+    }
+    glm::vec3 reflectance(size_t receiver) const {
+        return receiver < texels_.size() ? texels_.reflectance[receiver]
+                                         : models_.reflectance(receiver - texels_.size());
+    }
     GatherFrom at(size_t receiver) const {
+        if (receiver >= texels_.size()) {
+            const size_t i = receiver - texels_.size();
+            return {{&models_.point(i), 1}, static_cast<uint32_t>(receiver), no_condition, models_.model(i)};
+        }
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
                 static_cast<uint32_t>(receiver),
                 conditionOf(receiver)};
     }
     // no_condition but for the texels of doors' leaves.
     uint32_t conditionOf(size_t receiver) const {
+        if (receiver >= texels_.size()) return no_condition;
         return rays_.triangles()[unwrap_.faces[texels_.sample(receiver, 0).face].triangle].condition;
     }
 
     // Of a unit direction of the world, in the frame that the point's light is kept in; a probe's is the world's.
     glm::vec3 toTangent(const SamplePoint& point, glm::vec3 world) const;
     TangentFrame frameOf(const SamplePoint& point) const;
-    // A probe; `id` seeds its sequence.
-    static GatherFrom atProbe(const SamplePoint& point, uint32_t id) { return {{&point, 1}, id, no_condition}; }
+    // A probe; `id` seeds its sequence, `ignored` is the model that it lights.
+    static GatherFrom atProbe(const SamplePoint& point, uint32_t id, uint32_t ignored = no_model) {
+        return {{&point, 1}, id, no_condition, ignored};
+    }
+    // The receiver that a ray reads which hit a model; no_index for what has no light. `chance` draws among several.
+    uint32_t modelReceiverAt(const Hit& hit, uint32_t chance) const;
 
     const RayScene& rays() const { return rays_; }
     const Unwrap& unwrap() const { return unwrap_; }
     const Texels& texels() const { return texels_; }
     const DoorPaths& paths() const { return paths_; }
     const EmitterSampler& emitters() const { return emitters_; }
+    const ModelReceivers& models() const { return models_; }
 
    private:
     template <class Light>
@@ -196,6 +218,7 @@ class Gatherer {
     const DoorPaths& paths_;
     SkySampler sky_;
     DoorGuides guides_;
+    ModelReceivers models_;
     std::vector<uint32_t> guide_of_term_;
 };
 

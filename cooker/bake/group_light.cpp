@@ -11,6 +11,49 @@ std::vector<std::vector<uint32_t>> termsOfGroups(const std::vector<Term>& terms,
     return of_group;
 }
 
+// What a group keeps of a receiver's light: all but the noise, which is of no use later.
+ReceiverLight inTerm(const ReceiverLight& l, uint32_t term) {
+    return {term, l.light, 0, l.keep};
+}
+ProbeTermLight inTerm(const ProbeTermLight& l, uint32_t term) {
+    return {term, l.light, 0, 0};
+}
+
+template <class Entry>
+Sparse<Entry> partOf(const Sparse<Entry>& light, std::span<const uint32_t> own_index) {
+    return Sparse<Entry>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
+        std::vector<Entry> row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            for (const Entry& l : light.row(i))
+                if (own_index[l.term] != no_term) row.push_back(inTerm(l, own_index[l.term]));
+            emit(std::span<const Entry>(row));
+        }
+    });
+}
+
+// One group's light, and the terms that it counts as its own.
+template <class Entry>
+struct Part {
+    const Sparse<Entry>* light;
+    const std::vector<uint32_t>* terms;
+};
+
+template <class Entry>
+Sparse<Entry> withParts(const Sparse<Entry>& light, const std::vector<Part<Entry>>& parts) {
+    return Sparse<Entry>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
+        std::vector<Entry> row;
+        for (size_t i = begin; i < end; ++i) {
+            const auto here = light.row(i);
+            row.assign(here.begin(), here.end());
+            for (const Part<Entry>& part : parts)
+                for (const Entry& l : part.light->row(i)) row.push_back(inTerm(l, (*part.terms)[l.term]));
+            std::ranges::sort(row, {}, &Entry::term);
+            emit(std::span<const Entry>(row));
+        }
+    });
+}
+
 }  // namespace
 
 GroupLight lightOfGroup(const Baked& baked, uint32_t group, uint32_t bounces) {
@@ -23,43 +66,26 @@ GroupLight lightOfGroup(const Baked& baked, uint32_t group, uint32_t bounces) {
         own_index[t] = static_cast<uint32_t>(out.reports.size());
         out.reports.push_back(baked.reports[t]);
     }
-    out.light = Sparse<ReceiverLight>::build(baked.light.rows(), [&](size_t begin, size_t end, auto emit) {
-        std::vector<ReceiverLight> row;
-        for (size_t i = begin; i < end; ++i) {
-            row.clear();
-            for (const ReceiverLight& l : baked.light.row(i))
-                if (own_index[l.term] != no_term) row.push_back({own_index[l.term], l.light, 0, l.keep});
-            emit(std::span<const ReceiverLight>(row));
-        }
-    });
+    out.light = partOf(baked.light, own_index);
+    out.local_light = partOf(baked.local_light, own_index);
     return out;
 }
 
 void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) {
     const auto terms = termsOfGroups(baked.terms, groups.size());
-    std::vector<const GroupLight*> added;
-    std::vector<uint32_t> group_of;
+    std::vector<Part<ReceiverLight>> texels;
+    std::vector<Part<ProbeTermLight>> probes;
     for (uint32_t g = 0; g < groups.size(); ++g) {
         if (!groups[g]) continue;
-        added.push_back(&*groups[g]);
-        group_of.push_back(g);
+        texels.push_back({&groups[g]->light, &terms[g]});
+        probes.push_back({&groups[g]->local_light, &terms[g]});
         baked.door_flux[g] = groups[g]->door_flux;
         baked.bounces = std::max(baked.bounces, groups[g]->bounces);
         for (size_t k = 0; k < terms[g].size(); ++k) baked.reports[terms[g][k]] = groups[g]->reports[k];
     }
-    if (added.empty()) return;
-    baked.light = Sparse<ReceiverLight>::build(baked.light.rows(), [&](size_t begin, size_t end, auto emit) {
-        std::vector<ReceiverLight> row;
-        for (size_t i = begin; i < end; ++i) {
-            const auto here = baked.light.row(i);
-            row.assign(here.begin(), here.end());
-            for (size_t a = 0; a < added.size(); ++a)
-                for (const ReceiverLight& l : added[a]->light.row(i))
-                    row.push_back({terms[group_of[a]][l.term], l.light, 0, l.keep});
-            std::ranges::sort(row, {}, &ReceiverLight::term);
-            emit(std::span<const ReceiverLight>(row));
-        }
-    });
+    if (texels.empty()) return;
+    baked.light = withParts(baked.light, texels);
+    baked.local_light = withParts(baked.local_light, probes);
 }
 
 SparseLight radianceOfGroup(const SparseLight& radiance, const DoorPaths& paths, uint32_t group) {

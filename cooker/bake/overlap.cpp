@@ -60,6 +60,7 @@ void limitOverlap(Baked& baked, uint32_t most) {
     const auto before = lightOfTerms(baked.light, baked.terms.size());
     baked.light = limited(baked.light, most);
     if (baked.grid.light.rows() > 0) baked.grid.light = limited(baked.grid.light, most);
+    if (baked.local_light.rows() > 0) baked.local_light = limited(baked.local_light, most);
     const auto after = lightOfTerms(baked.light, baked.terms.size());
     for (size_t t = 0; t < baked.reports.size(); ++t)
         if (before[t] > 0)

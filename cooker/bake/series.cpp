@@ -54,7 +54,7 @@ class Expansion {
     Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
               std::span<const uint8_t> groups)
         : gatherer_(gatherer),
-          texels_(gatherer.texels()),
+          receivers_(gatherer.receiverCount()),
           settings_(settings),
           progress_(progress),
           grid_(gatherer.rays(), settings.light_grid, groups),
@@ -91,18 +91,18 @@ class Expansion {
     // What surfaces reflect at the first bounce: punctual light, emitters and the sky. The rays that look for emitters
     // and sky leave behind which receivers see one another: the links that the series follows.
     void directPass() {
-        progress_.stage("direct light and links", texels_.size());
-        links_.assign(texels_.size() * settings_.series_rays, no_index);
+        progress_.stage("direct light and links", receivers_);
+        links_.assign(receivers_ * settings_.series_rays, no_index);
         GatherOptions options;
         options.rays = settings_.series_rays;
         options.emitter_samples = settings_.emitter_samples;
         options.seed = settings_.seed;
         options.wanted_in_group = followed_in_group_;
-        SparseLight::Builder direct(texels_.size()), left_to_renderer(texels_.size());
-        Sparse<ReceiverLight>::Builder stored(texels_.size());
-        Sparse<GatherLinks::ThroughDoors>::Builder door_links(texels_.size());
-        Sparse<uint32_t>::Builder doors_seen(texels_.size());
-        forEachBlock(texels_.size(), [&](size_t begin, size_t end) {
+        SparseLight::Builder direct(receivers_), left_to_renderer(receivers_);
+        Sparse<ReceiverLight>::Builder stored(receivers_);
+        Sparse<GatherLinks::ThroughDoors>::Builder door_links(receivers_);
+        Sparse<uint32_t>::Builder doors_seen(receivers_);
+        forEachBlock(receivers_, [&](size_t begin, size_t end) {
             TermAccumulator<Gathered> sum(terms_), full(terms_);
             for (uint32_t t = 0; t < terms_; ++t) sum.setWanted(t, runs(t));
             std::vector<TermLight> row, left_row;
@@ -145,11 +145,11 @@ class Expansion {
 
     // What leaves each receiver: rho / pi * (direct + bounced so far), of the groups that still run or of all.
     SparseLight outgoing(const SparseLight& bounced, bool all) const {
-        return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
-                const glm::vec3 reflect = texels_.reflectance[i] / pi;
+                const glm::vec3 reflect = gatherer_.reflectance(i) / pi;
                 const uint32_t own = gatherer_.conditionOf(i);
                 for (const auto* part : {&out_.direct, &bounced})
                     for (const TermLight& l : part->row(i)) {
@@ -165,7 +165,7 @@ class Expansion {
     // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
     SparseLight follow(const SparseLight& radiance, const SparseLight& bounced) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
-        return SparseLight::build(texels_.size(), [&](size_t begin, size_t end, auto emit) {
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
@@ -195,7 +195,7 @@ class Expansion {
         std::vector<double> sums(paths_.groupCount());
         for (size_t i = 0; i < light.rows(); ++i)
             for (const TermLight& l : light.row(i))
-                sums[paths_.terms()[l.term].group] += static_cast<double>(texels_.area_m2[i] * luminance(l.value));
+                sums[paths_.terms()[l.term].group] += static_cast<double>(gatherer_.areaM2(i) * luminance(l.value));
         return sums;
     }
 
@@ -203,7 +203,7 @@ class Expansion {
     // is still to come of its own light is little.
     void bounce() {
         progress_.stage("bounces", settings_.bounces_max);
-        out_.bounced = SparseLight::build(texels_.size(), [](size_t begin, size_t end, auto emit) {
+        out_.bounced = SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
             for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
         });
         out_.bounces.assign(paths_.groupCount(), 0);
@@ -282,7 +282,7 @@ class Expansion {
         }
         std::vector<double> dropped(terms_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
-            const double energy = static_cast<double>(texels_.area_m2[i] * stored);
+            const double energy = static_cast<double>(gatherer_.areaM2(i) * stored);
             out_.reports[t].energy += energy;
             if (!out_.active(t, direct, bounced)) dropped[t] += energy;
         });
@@ -295,7 +295,7 @@ class Expansion {
     void forEachPair(auto&& visit) const {
         std::vector<float> direct(terms_), bounced(terms_), left_out(terms_);
         std::vector<uint32_t> here;
-        for (size_t i = 0; i < texels_.size(); ++i) {
+        for (size_t i = 0; i < receivers_; ++i) {
             here.clear();
             for (const TermLight& l : out_.direct.row(i)) {
                 direct[l.term] = luminance(l.value);
@@ -316,7 +316,7 @@ class Expansion {
     }
 
     const Gatherer& gatherer_;
-    const Texels& texels_;
+    size_t receivers_;  // texels, then those of models
     const BakeSettings& settings_;
     Progress& progress_;
     LightGrid grid_;

@@ -73,8 +73,67 @@ struct StoredLight {
     Gathered light;
     float keep;
 };
-constexpr size_t floats_per_light = 8;
-static_assert(sizeof(StoredLight) == floats_per_light * sizeof(float));
+static_assert(sizeof(StoredLight) == 8 * sizeof(float));
+StoredLight stored(const ReceiverLight& l) {
+    return {l.light, l.keep};
+}
+ReceiverLight restored(uint32_t term, const StoredLight& light) {
+    return {term, light.light, 0, light.keep};
+}
+// Of a ProbeTermLight.
+static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
+const ProbeLight& stored(const ProbeTermLight& l) {
+    return l.light;
+}
+ProbeTermLight restored(uint32_t term, const ProbeLight& light) {
+    return {term, light, 0, 0};
+}
+
+template <class Entry>
+void putLight(ByteWriter& out, const Sparse<Entry>& light) {
+    using Stored = std::decay_t<decltype(stored(std::declval<Entry>()))>;
+    constexpr size_t floats = sizeof(Stored) / sizeof(float);
+    std::vector<uint16_t> counts, terms;
+    std::vector<float> columns(light.entryCount() * floats);
+    size_t n = 0;
+    for (size_t i = 0; i < light.rows(); ++i) {
+        counts.push_back(static_cast<uint16_t>(light.row(i).size()));
+        for (const Entry& l : light.row(i)) {
+            terms.push_back(static_cast<uint16_t>(l.term));
+            const auto values = std::bit_cast<std::array<float, floats>>(stored(l));
+            for (size_t f = 0; f < floats; ++f) columns[f * light.entryCount() + n] = values[f];
+            ++n;
+        }
+    }
+    putAll(out, counts);
+    putAll(out, terms);
+    putFloats(out, columns);
+}
+
+template <class Entry>
+std::optional<Sparse<Entry>> getLight(ByteReader& in, size_t term_count) {
+    using Stored = std::decay_t<decltype(stored(std::declval<Entry>()))>;
+    constexpr size_t floats = sizeof(Stored) / sizeof(float);
+    const auto counts = in.getArray<uint16_t>();
+    const auto terms = in.getArray<uint16_t>();
+    const std::vector<float> columns = getFloats(in);
+    if (!in.ok() || columns.size() != terms.size() * floats) return {};
+    typename Sparse<Entry>::Builder rows(counts.size());
+    std::vector<Entry> row;
+    size_t n = 0;
+    for (size_t i = 0; i < counts.size(); ++i) {
+        row.clear();
+        if (n + counts[i] > terms.size()) return {};
+        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
+            std::array<float, floats> values;
+            for (size_t f = 0; f < floats; ++f) values[f] = columns[f * terms.size() + n];
+            if (terms[n] >= term_count) return {};
+            row.push_back(restored(terms[n], std::bit_cast<Stored>(values)));
+        }
+        rows.put(i, row);
+    }
+    return rows.finish();
+}
 
 }  // namespace
 
@@ -117,26 +176,13 @@ std::optional<ChartsEntry> chartsFromBytes(std::span<const std::byte> bytes) {
 }
 
 std::vector<std::byte> toBytes(const GroupLight& group) {
-    std::vector<uint16_t> counts, terms;
-    std::vector<float> columns(group.light.entryCount() * floats_per_light);
-    size_t n = 0;
-    for (size_t i = 0; i < group.light.rows(); ++i) {
-        counts.push_back(static_cast<uint16_t>(group.light.row(i).size()));
-        for (const ReceiverLight& l : group.light.row(i)) {
-            terms.push_back(static_cast<uint16_t>(l.term));
-            const auto values = std::bit_cast<std::array<float, floats_per_light>>(StoredLight{l.light, l.keep});
-            for (size_t f = 0; f < floats_per_light; ++f) columns[f * group.light.entryCount() + n] = values[f];
-            ++n;
-        }
-    }
     ByteWriter out;
     out.put(group.bounces);
     putAll(out, group.reports);
     putAll(out, group.door_flux.alone);
     putAll(out, group.door_flux.pairs);
-    putAll(out, counts);
-    putAll(out, terms);
-    putFloats(out, columns);
+    putLight(out, group.light);
+    putLight(out, group.local_light);
     return out.take();
 }
 
@@ -147,26 +193,12 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
     group.reports = in.getArray<TermReport>();
     group.door_flux.alone = in.getArray<double>();
     group.door_flux.pairs = in.getArray<DoorFlux::Pair>();
-    const auto counts = in.getArray<uint16_t>();
-    const auto terms = in.getArray<uint16_t>();
-    const std::vector<float> columns = getFloats(in);
-    if (!in.atEnd() || columns.size() != terms.size() * floats_per_light) return {};
-    Sparse<ReceiverLight>::Builder rows(counts.size());
-    std::vector<ReceiverLight> row;
-    size_t n = 0;
-    for (size_t i = 0; i < counts.size(); ++i) {
-        row.clear();
-        if (n + counts[i] > terms.size()) return {};
-        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
-            std::array<float, floats_per_light> values;
-            for (size_t f = 0; f < floats_per_light; ++f) values[f] = columns[f * terms.size() + n];
-            if (terms[n] >= group.reports.size()) return {};
-            const auto stored = std::bit_cast<StoredLight>(values);
-            row.push_back({terms[n], stored.light, 0, stored.keep});
-        }
-        rows.put(i, row);
-    }
-    group.light = rows.finish();
+    auto light = getLight<ReceiverLight>(in, group.reports.size());
+    if (!light) return {};
+    auto local = getLight<ProbeTermLight>(in, group.reports.size());
+    if (!local || !in.atEnd()) return {};
+    group.light = std::move(*light);
+    group.local_light = std::move(*local);
     return group;
 }
 

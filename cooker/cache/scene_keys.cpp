@@ -15,6 +15,11 @@ KeyBuilder& addAll(KeyBuilder& key, const std::vector<T>& values) {
     return key.addArray(std::span<const T>(values));
 }
 
+void addMatrix(KeyBuilder& key, const glm::dmat4& m) {
+    for (int column = 0; column < 4; ++column)
+        for (int row = 0; row < 4; ++row) key.add(std::bit_cast<uint64_t>(m[column][row]));
+}
+
 // What a material does to light that it did not emit.
 void addSurface(KeyBuilder& key, const Material& m) {
     key.add(m.name);
@@ -38,9 +43,10 @@ void addMesh(KeyBuilder& key, const SceneMesh& mesh) {
     addAll(key, mesh.triangle_materials);
     addAll(key, mesh.triangle_regions);
     key.add(mesh.lighting).addOptional(mesh.door).add(uint32_t{mesh.is_open_leaf});
-    for (int column = 0; column < 4; ++column)
-        for (int row = 0; row < 4; ++row) key.add(std::bit_cast<uint64_t>(mesh.open_from_closed[column][row]));
+    addMatrix(key, mesh.open_from_closed);
     key.addOptional(mesh.texels_per_metre).addOptional(mesh.grid_spacing_m);
+    key.add(mesh.gltf_node).add(mesh.gltf_mesh);
+    addMatrix(key, mesh.world_from_node);
 }
 
 void addLamp(KeyBuilder& key, const PunctualLight& light) {
@@ -80,6 +86,9 @@ Key geometryKey(const Scene& scene) {
     for (const Image& image : scene.images) addImage(key, image);
     key.add(uint64_t{scene.meshes.size()});
     for (const SceneMesh& mesh : scene.meshes) addMesh(key, mesh);
+    key.add(uint64_t{scene.models.size()});
+    for (const SceneModel& model : scene.models)
+        for (int axis = 0; axis < 3; ++axis) key.add(model.probes[axis]);
     key.add(uint64_t{scene.doors.size()});
     for (const SceneDoor& door : scene.doors) key.add(door.name).add(uint32_t{door.pose});
     key.add(uint64_t{scene.combinations.size()});
@@ -105,8 +114,9 @@ Key sceneKey(const Scene& scene) {
         key.add(v.name).add(v.vertical_fov_rad);
         add(add(key, v.position_m), v.forward);
     }
-    addAll(key, scene.dynamic_places_m);
     addPlayAreas(key, scene);
+    key.add(uint64_t{scene.dynamic_places.size()});
+    for (const DynamicPlace& place : scene.dynamic_places) addMatrix(key.add(place.node), place.world_from_node);
     key.add(uint64_t{scene.warnings.size()});
     for (const std::string& warning : scene.warnings) key.add(warning);
     return key.finish();

@@ -36,7 +36,7 @@ std::vector<Face> listFaces(const RayScene& rays) {
     const Scene& scene = rays.scene();
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const LevelTriangle& triangle = rays.triangles()[t];
-        if (scene.meshes[triangle.mesh].lighting == Lighting::None) continue;
+        if (!hasLightmap(scene.meshes[triangle.mesh])) continue;
         faces.push_back({t, false});
         if (scene.materials[triangle.material].double_sided) faces.push_back({t, true});
     }
@@ -205,7 +205,7 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
     for (size_t m = 0; m < scene.meshes.size(); ++m) {
         const SceneMesh& mesh = scene.meshes[m];
         std::string why;
-        if (mesh.uv1.empty() || mesh.triangles.empty() || mesh.lighting == Lighting::Dynamic) continue;
+        if (mesh.uv1.empty() || mesh.triangles.empty() || !hasLightmap(mesh)) continue;
         use_file_uv[m] = validUnwrap(mesh, why);
         if (!use_file_uv[m])
             out.warnings.push_back(fmt::format("{}: node '{}': TEXCOORD_1 is no lightmap unwrap ({}); charts were made",

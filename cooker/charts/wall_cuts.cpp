@@ -69,7 +69,7 @@ class WallCutter {
     WallCutter(Scene& scene, float texels_per_metre) : scene_(scene) {
         for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
             const SceneMesh& mesh = scene.meshes[m];
-            if (mesh.lighting == Lighting::Dynamic || mesh.lighting == Lighting::None) continue;
+            if (!hasLightmap(mesh)) continue;
             for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
                 std::array<glm::vec3, 3> c;
                 for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];

@@ -143,27 +143,28 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
 }
 
-void buildProbeClusters(const BakedGrid& baked, std::span<const uint32_t> contribution_of_term, PackData& pack) {
-    if (baked.grid.empty()) return;
+void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, PackData& pack) {
+    const size_t global = baked.grid.light.rows(), all = global + baked.local_light.rows();
+    if (all == 0) return;
+    const auto row = [&](size_t i) { return i < global ? baked.grid.light.row(i) : baked.local_light.row(i - global); };
     ProbeData& probes = pack.probes;
     const ProbeEncoding encoding{pack.exposure, pack.color_format};
-    probes.base.assign(baked.light.rows(), encodeProbe({}, encoding));
+    probes.base.assign(all, encodeProbe({}, encoding));
     Grouping grouping;
-    for (uint32_t i = 0; i < baked.light.rows(); ++i) {
-        grouping.add(i, 0, baked.light.row(i), contribution_of_term);
-        for (const ProbeTermLight& l : baked.light.row(i))
+    for (uint32_t i = 0; i < all; ++i) {
+        grouping.add(i, 0, row(i), contribution_of_term);
+        for (const ProbeTermLight& l : row(i))
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
     }
     probes.record_counts = fillTables<ProbeRecord>(
         grouping, pack.contributions.size(), contribution_of_term,
-        {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{},
-        [&](uint32_t i) { return baked.light.row(i); },
+        {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{}, row,
         [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
         [&](uint32_t first, uint32_t count) {
             for (uint32_t done = 0; done < count; done += batch_receivers_max)
                 probes.batches.push_back({first + done, std::min(batch_receivers_max, count - done)});
         });
-    probes.global = baked.grid;
+    probes.global = baked.grid.grid;
 }
 
 }  // namespace dimmer::cook

@@ -16,7 +16,8 @@ namespace dimmer::cook {
 void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
                    PackData& pack);
 
-// The same for light probes: fills pack.probes. Within a cluster probes follow their numbers.
-void buildProbeClusters(const BakedGrid& baked, std::span<const uint32_t> contribution_of_term, PackData& pack);
+// The same for light probes, global ones first: fills pack.probes but its local grids. Within a cluster probes follow
+// their numbers.
+void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, PackData& pack);
 
 }  // namespace dimmer::cook

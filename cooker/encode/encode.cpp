@@ -99,11 +99,12 @@ float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
         for (const ReceiverLight& l : baked.light.row(i)) sum += max_weights[l.term] * l.light.irradiance_lux;
         largest = std::max({largest, sum.x, sum.y, sum.z});
     }
-    for (size_t i = 0; i < baked.grid.light.rows(); ++i) {
-        glm::vec3 sum(0);
-        for (const ProbeTermLight& l : baked.grid.light.row(i)) sum += max_weights[l.term] * l.light.radiance[0];
-        largest = std::max({largest, sum.x, sum.y, sum.z});
-    }
+    for (const auto* probes : {&baked.grid.light, &baked.local_light})
+        for (size_t i = 0; i < probes->rows(); ++i) {
+            glm::vec3 sum(0);
+            for (const ProbeTermLight& l : probes->row(i)) sum += max_weights[l.term] * l.light.radiance[0];
+            largest = std::max({largest, sum.x, sum.y, sum.z});
+        }
     if (!(largest > 0) || !std::isfinite(largest)) return 1;
     return std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -40.0f, 40.0f));
 }

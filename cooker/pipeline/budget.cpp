@@ -42,6 +42,8 @@ PackCost costOf(const PackData& pack) {
     cost.ancillary = bytes.ancillary - cost.global_grid;
     for (const Mesh& m : pack.meshes)
         cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
+    for (const ModelMesh& m : pack.model_meshes)
+        cost.meshes += m.vertices.size() * sizeof(ModelVertex) + m.indices.size() * sizeof(uint32_t);
     for (uint32_t e = 0; e < pack.elements.size(); ++e) {
         ElementCost element{e, 0, 0};
         for (const Contribution& c : pack.contributions) {

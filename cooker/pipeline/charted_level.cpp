@@ -2,8 +2,8 @@
 
 #include <charts/wall_cuts.h>
 #include <pipeline/level_meshes.h>
+#include <pipeline/prepare_scene.h>
 #include <pipeline/profile.h>
-#include <scene/open_pose.h>
 
 #include <fmt/format.h>
 
@@ -29,7 +29,7 @@ Expected<std::unique_ptr<ChartedLevel>> chartAgain(const std::filesystem::path& 
     if (!imported) return std::unexpected(imported.error());
     auto charted = std::make_unique<ChartedLevel>();
     charted->scene = std::move(*imported);
-    addOpenLeaves(charted->scene);
+    prepareScene(charted->scene, settings->profile);
     cutAtWalls(charted->scene, settings->profile.texels_per_metre);
     charted->rays = std::make_unique<RayScene>(charted->scene);
     auto charts = unwrap(*charted->rays, {settings->profile.texels_per_metre, settings->profile.page_size});

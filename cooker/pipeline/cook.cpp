@@ -9,11 +9,13 @@
 #include <charts/wall_cuts.h>
 #include <cluster/cluster.h>
 #include <encode/encode.h>
+#include <models/scene_models.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
+#include <pipeline/model_meshes.h>
+#include <pipeline/prepare_scene.h>
 #include <pipeline/set_scales.h>
 #include <pipeline/settings.h>
-#include <scene/open_pose.h>
 #include <trace/ray_scene.h>
 #include <update/state_text.h>
 #include <write/pack_writer.h>
@@ -152,7 +154,7 @@ void stripFile(std::vector<std::string>& warnings, const std::string& file) {
 Expected<void> chart(Scene& scene, const Profile& profile, const Quality& quality, Progress& progress, CookCache* cache,
                      Charted& out) {
     progress.stage("charts", 2);
-    addOpenLeaves(scene);
+    prepareScene(scene, profile);
     if (cache) {
         const Key geometry = geometryKey(scene);
         out.key = chartsKey(geometry, unwrapOptions(profile), quality.samples_per_texel);
@@ -203,10 +205,8 @@ Baked bakeWithCache(const Charted& level, BakeSettings settings, const SetScales
 
 bool wantsGrid(const Profile& profile, const Scene& scene) {
     if (profile.global_grid != GridMode::Auto) return profile.global_grid == GridMode::On;
-    return !scene.dynamic_places_m.empty() || !scene.play_areas.empty() ||
-           std::ranges::any_of(scene.meshes, [](const SceneMesh& mesh) {
-               return mesh.lighting == Lighting::Dynamic || mesh.lighting == Lighting::LocalGrid;
-           });
+    return !scene.dynamic_places.empty() || !scene.play_areas.empty() ||
+           std::ranges::any_of(scene.meshes, [](const SceneMesh& mesh) { return mesh.lighting == Lighting::Dynamic; });
 }
 
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene) {
@@ -308,9 +308,11 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
         buildClusters(texels, baked, contribution_of_term, pack);
-        buildProbeClusters(baked.grid, contribution_of_term, pack);
+        buildProbeClusters(baked, contribution_of_term, pack);
+        pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));
         stats.free_volume_m3 = baked.grid.free_volume_m3;
         pack.meshes = levelMeshes(rays, charts, scales.emission_cd_m2);
+        describeModels(scene, scales.emission_cd_m2, pack);
         describePlaces(scene, pack);
         pack.settings_json = profile.settingsJson(quality_name);
         progress.advance(1);

@@ -6,8 +6,8 @@
 #include <charts/wall_cuts.h>
 #include <encode/encode.h>
 #include <pipeline/cook.h>
+#include <pipeline/prepare_scene.h>
 #include <pipeline/set_scales.h>
-#include <scene/open_pose.h>
 
 #include <tbb/parallel_for.h>
 
@@ -50,7 +50,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     auto bake = std::make_unique<Rebake>();
     bake->scene = std::move(scene);
     bake->scales = divideByScales(bake->scene);
-    addOpenLeaves(bake->scene);
+    prepareScene(bake->scene, settings->profile);
     cutAtWalls(bake->scene, settings->profile.texels_per_metre);
     bake->rays.emplace(bake->scene);
     auto charts = unwrap(*bake->rays, {settings->profile.texels_per_metre, settings->profile.page_size});
@@ -253,7 +253,9 @@ void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std
         }
         if (const Emitter* e = bake.emitters->emitterOf(hit->triangle); e && (!hit->back || e->double_sided))
             sum[e->group].add(lux_per_radiance * e->radiance_cd_m2, d, normals);
-        const uint32_t found = receiverOf(bake.charts, bake.texels, *hit);
+        uint32_t found = receiverOf(bake.charts, bake.texels, *hit);
+        if (found == no_index && !bake.gatherer->models().empty())
+            found = bake.gatherer->modelReceiverAt(*hit, hash(id, i));
         if (found == no_index) continue;
         for (const TermLight& l : bake.series.radiance.row(found))
             if (const Term& term = bake.paths->terms()[l.term]; term.doors_open.empty())

@@ -10,18 +10,6 @@ std::array<float, 3> array(glm::vec3 v) {
     return {v.x, v.y, v.z};
 }
 
-// The one colour that a mesh is drawn with: the material's, times the mean of its texture.
-glm::vec3 meanReflectance(const Scene& scene, const Material& material) {
-    glm::vec3 color = material.base_color;
-    if (material.base_color_image) {
-        glm::vec4 sum(0);
-        const Image& image = scene.images[*material.base_color_image];
-        for (const glm::vec4& texel : image.texels) sum += texel;
-        if (!image.texels.empty()) color *= glm::vec3(sum) / static_cast<float>(image.texels.size());
-    }
-    return material.reflectance(color);
-}
-
 class MeshBuilder {
    public:
     Mesh mesh;
@@ -41,6 +29,17 @@ class MeshBuilder {
 };
 
 }  // namespace
+
+glm::vec3 meanReflectance(const Scene& scene, const Material& material) {
+    glm::vec3 color = material.base_color;
+    if (material.base_color_image) {
+        glm::vec4 sum(0);
+        const Image& image = scene.images[*material.base_color_image];
+        for (const glm::vec4& texel : image.texels) sum += texel;
+        if (!image.texels.empty()) color *= glm::vec3(sum) / static_cast<float>(image.texels.size());
+    }
+    return material.reflectance(color);
+}
 
 std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::span<const glm::vec3> emission_cd_m2) {
     const Scene& scene = rays.scene();

@@ -89,10 +89,11 @@ void multiplyByScales(const SetScales& scales, Baked& baked) {
         const float after = luminance(l.light.irradiance_lux);
         l.light.tilted_lux *= before > 0 ? after / before : 0.0f;
     });
-    baked.grid.light.forEach([&](ProbeTermLight& l) {
-        const glm::vec3 scale = scales.of_group[baked.terms[l.term].group];
-        for (glm::vec3& coefficient : l.light.radiance) coefficient *= scale;
-    });
+    for (auto* probes : {&baked.grid.light, &baked.local_light})
+        probes->forEach([&](ProbeTermLight& l) {
+            const glm::vec3 scale = scales.of_group[baked.terms[l.term].group];
+            for (glm::vec3& coefficient : l.light.radiance) coefficient *= scale;
+        });
 }
 
 }  // namespace dimmer::cook

@@ -175,8 +175,8 @@ std::vector<Setting> settingsOf(Profile& p) {
          "the worst texel of an update costs"});
     list.push_back({"grids.global", &p.global_grid, 0, 0,
                     "whether the global grid is baked, which lights what has no lightmap. auto: where the level says "
-                    "that something moves (a node with dimmer_dynamic, a mesh whose dimmer_lighting is dynamic or "
-                    "local_grid, a dimmer_play_area); on: always; off: never"});
+                    "that something moves (a node with dimmer_dynamic, a mesh whose dimmer_lighting is dynamic, a "
+                    "dimmer_play_area); on: always; off: never"});
     list.push_back({"grids.probes_max", &p.probes_max, 0, 1 << 20,
                     "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. One per cubic "
                     "metre of open space is never exceeded"});
@@ -184,7 +184,9 @@ std::vector<Setting> settingsOf(Profile& p) {
                     "metres between probes of the global grid at least; light around a lamp changes over a hand's "
                     "breadth"});
     list.push_back({"grids.local_spacing", &p.local_spacing_m, 0.1, 100,
-                    "metres between the probes of a model's own grid; unused until local grids are baked"});
+                    "metres between the probes of a model's own grid at most, where its node does not say"});
+    list.push_back({"grids.local_probes_max", &p.local_probes_max, 8, 4096,
+                    "light probes of one model's own grid at most; a larger model's stand further apart"});
     for (auto [name, q] : {std::pair{"draft", &p.draft}, {"preview", &p.preview}, {"final", &p.final}})
         addQuality(name, *q, list);
     return list;

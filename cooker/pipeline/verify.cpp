@@ -5,6 +5,8 @@
 #include <dimmer/probe_grid.h>
 #include <format/texel.h>
 #include <pipeline/dissect.h>
+#include <pipeline/measured_light.h>
+#include <pipeline/verify_models.h>
 #include <probes/free_space.h>
 
 #include <fmt/format.h>
@@ -16,11 +18,6 @@
 namespace dimmer::cook {
 namespace {
 
-// The reference's standard error over the error that is measured; see converged.
-constexpr double converged_share = 0.1;
-// First look at a point, good enough to say how large the error is and so how many paths it takes.
-constexpr double first_relative = 0.02;
-constexpr uint32_t hidden_rays = 16;
 constexpr uint32_t tries_per_point = 20;
 // A set's light at a point is known well enough at this share of the light there and of the set's typical light, with
 // the default limit of paths; more paths make it smaller, as they do the noise.
@@ -86,19 +83,6 @@ glm::vec3 fromTangent(const TangentFrame& f, glm::vec3 d) {
     return f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
 }
 
-// Inside something closed: a good part of what the point sees are backs. Half would do in the middle of it, but where a
-// wall meets a floor inside, half of the rays end on the floor's front.
-bool hidden(const RayScene& rays, const VerifyPoint& p, uint32_t seed) {
-    uint32_t backs = 0;
-    for (uint32_t i = 0; i < hidden_rays; ++i) {
-        const glm::vec3 direction = fromTangent(p.frame, cosineDirection(sequence2d(i, seed)));
-        const auto hit = rays.nearest(p.position_m + 1e-3f * p.frame.normal, direction, 1e30f, seed + i);
-        if (!hit || !hit->back) continue;
-        backs += !rays.scene().materials[rays.triangles()[hit->triangle].material].double_sided;
-    }
-    return 4 * backs > hidden_rays;
-}
-
 // Uniform over the cap around +Z.
 glm::vec3 tiltedNormal(glm::vec2 u) {
     const float cos_max = std::cos(tilt_max_deg * pi / 180);
@@ -111,37 +95,6 @@ std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool ti
     for (const VerifyPoint& p : points)
         out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal, p.frame.normal});
     return out;
-}
-
-std::vector<LightPair> pairsOf(std::span<const double> values, std::span<const ReferenceEstimate> estimates) {
-    std::vector<LightPair> out;
-    for (size_t i = 0; i < values.size(); ++i) {
-        const ReferenceValue v = estimates[i].value();
-        out.push_back(
-            {values[i], static_cast<double>(luminance(v.irradiance_lux)), static_cast<double>(v.luminance_error_lux)});
-    }
-    return out;
-}
-
-// One kind of normal: paths until the reference is a tenth of what is measured, or the limit.
-struct Measured {
-    std::vector<ReferenceEstimate> estimates;
-    std::vector<LightPair> pairs;
-    ErrorFigures figures;
-};
-
-Measured measure(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, std::span<const double> values,
-                 double floor_lux, uint32_t paths_max, Progress& progress) {
-    Measured m{std::vector<ReferenceEstimate>(points.size()), {}, {}};
-    ReferenceTarget target{.paths_max = paths_max, .relative = first_relative, .floor_lux = floor_lux};
-    target.paths_min = std::min(target.paths_min, paths_max);
-    for (int round = 0; round < 2; ++round) {
-        refineAll(tracer, points, target, m.estimates, progress);
-        m.pairs = pairsOf(values, m.estimates);
-        m.figures = lightError(m.pairs, floor_lux);
-        target.relative = converged_share * m.figures.measured_mean;
-    }
-    return m;
 }
 
 bool reached(const ErrorFigures& f) {
@@ -285,7 +238,7 @@ std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, co
         auto t = std::ranges::upper_bound(triangles, target, {}, &PackTriangle::cumulative_m2);
         if (t == triangles.end()) --t;
         VerifyPoint p = pointOn(pack, *t, {unitFloat(hash(seed, 4 * i + 1)), unitFloat(hash(seed, 4 * i + 2))});
-        if (hidden(rays, p, hash(seed, 4 * i + 3))) continue;
+        if (hidden(rays, p.position_m, p.frame, hash(seed, 4 * i + 3))) continue;
         p.tilted = fromTangent(p.frame, tiltedNormal(sequence2d(i, hash(seed, 0x7117u))));
         points.push_back(p);
     }
@@ -368,6 +321,9 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     report.surface_pairs = at_surface.pairs;
     report.converged = reached(report.surface) && reached(report.tilted);
     if (auto ok = verifyGrid(tracer, rays, pack, options, progress, report); !ok) return std::unexpected(ok.error());
+    const auto models = verifyModels(tracer, rays, pack, options, report.floor_lux, progress);
+    if (!models) return std::unexpected(models.error());
+    report.models = *models;
     for (const Measured* m : {&at_surface, &at_tilted})
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
     report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);

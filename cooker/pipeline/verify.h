@@ -58,9 +58,16 @@ struct SetReport {
     double energy_dropped = 0;  // share that fell below the activity threshold, as the pack states it
 };
 
+// Of models that stand.
+struct ModelFigures {
+    ErrorFigures shadowed;  // with what vertices know of their model's shadow on itself
+    ErrorFigures plain;     // the same places without
+};
+
 struct VerifyReport {
     ErrorFigures surface, tilted;
     ErrorFigures grid;  // at random places in the open, any normal; no points where the pack has no global grid
+    ModelFigures models;
     // The reference's standard error is at most a tenth of the measured error.
     bool converged = false;
     std::map<std::string, double> causes;  // mean error by cause

@@ -6,16 +6,15 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t rays_per_test = 24;
-// A probe closer to a wall stands for little but the wall.
-constexpr float clearance_m = 0.05f;
 constexpr uint32_t tries_per_place = 64;
 
 }  // namespace
 
-bool inTheOpen(const RayScene& rays, glm::vec3 point_m) {
+bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored, float clearance_m) {
     uint32_t hits = 0, backs = 0;
     for (uint32_t i = 0; i < rays_per_test; ++i) {
-        const auto hit = rays.nearest(point_m, uniformSphereDirection(sequence2d(i, 1)), far_away_m, i);
+        const glm::vec3 direction = uniformSphereDirection(sequence2d(i, 1));
+        const auto hit = rays.nearest(point_m, direction, far_away_m, i, Surfaces::All, ignored);
         if (!hit) continue;
         if (hit->distance_m < clearance_m) return false;
         ++hits;

@@ -266,6 +266,8 @@ class LevelImporter {
     void place(const PlacedNode& at, const MeshSettings& settings, std::optional<uint32_t> light_set, SceneMesh mesh) {
         mesh.node = nodeName(at.node);
         mesh.gltf_node = at.node;
+        mesh.gltf_mesh = model_.nodes[static_cast<size_t>(at.node)].mesh;
+        mesh.world_from_node = at.world_from_node;
         mesh.lighting = settings.lighting;
         mesh.texels_per_metre = settings.texels_per_metre;
         mesh.grid_spacing_m = settings.grid_spacing_m;
@@ -274,6 +276,10 @@ class LevelImporter {
         mesh.door = part.door;
         mesh.open_from_closed = part.open_from_closed;
         if (mesh.door && mesh.lighting != Lighting::Dynamic) elements_.doorHasGeometry(*mesh.door);
+        if (mesh.door && mesh.lighting == Lighting::LocalGrid) {
+            context_.warn(context_.nodeLabel(at.node), "is a door's leaf; it has a lightmap, not a local grid.");
+            mesh.lighting = Lighting::Lightmap;
+        }
         scene_.meshes.push_back(std::move(mesh));
     }
 
@@ -321,8 +327,7 @@ class LevelImporter {
         const auto dynamic = lighting(extras, owner);
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};
-        const glm::dvec3 place = at.world_from_node[3];
-        scene_.dynamic_places_m.emplace_back(place);
+        if (at.singular == -1) scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
         return {};
     }
 

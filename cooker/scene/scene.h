@@ -51,6 +51,8 @@ enum class Lighting {
 struct SceneMesh {
     std::string node;
     int gltf_node = -1;  // its index in the file; -1: of none
+    int gltf_mesh = -1;  // likewise; nodes with the same one are instances
+    glm::dmat4 world_from_node{1};
     std::vector<glm::vec3> positions_m;
     std::vector<glm::vec3> normals;            // unit; one per position
     std::vector<glm::vec2> uv0;                // for textures; empty when the file has none
@@ -65,6 +67,32 @@ struct SceneMesh {
     bool is_open_leaf = false;       // this is that leaf where it stands open (scene/open_pose.h)
     std::optional<float> texels_per_metre;
     std::optional<float> grid_spacing_m;
+    std::optional<uint32_t> model;  // into Scene::models: what a light grid lights
+};
+
+// Lighting::Automatic counts as a lightmap where nobody chose (chooseLighting, models/scene_models.h).
+inline bool hasLightmap(const SceneMesh& mesh) {
+    return mesh.lighting == Lighting::Automatic || mesh.lighting == Lighting::Lightmap;
+}
+
+// What a light grid lights: all meshes of one node. Model space is the node's, in metres: turned and moved as the node,
+// not scaled nor mirrored; where the node is sheared, it is turned as the world.
+struct SceneModel {
+    std::string node;
+    std::vector<uint32_t> meshes;  // into Scene::meshes; none: a place where things that move may stand
+    bool moves = false;            // gets its light at run time, where it then is
+    glm::mat3 world_from_model{1};
+    glm::vec3 origin_m{0};           // world space
+    glm::vec3 min_m{0}, max_m{0};    // its box, model space
+    glm::uvec3 probes{0};            // along each axis of the box, its corners included; of what stands
+    bool is_instance_shape = false;  // model space knows the node's shape alone: nodes of one mesh may share it
+    glm::vec3 scale{1};              // that model space has applied to the node's
+    glm::vec3 world(glm::vec3 p) const { return origin_m + world_from_model * p; }
+};
+
+struct DynamicPlace {
+    std::string node;
+    glm::dmat4 world_from_node{1};
 };
 
 struct LightProfile;  // scene/ies.h
@@ -128,8 +156,9 @@ struct Scene {
     std::vector<SceneLightSet> light_sets;  // in order of first appearance
     std::vector<SceneDoor> doors;           // in order of first appearance
     std::vector<std::vector<ElementRef>> combinations;
-    std::vector<SceneViewpoint> viewpoints;   // "player_start" first when there is one, then glTF cameras
-    std::vector<glm::vec3> dynamic_places_m;  // dimmer_dynamic on an empty node
+    std::vector<SceneViewpoint> viewpoints;    // "player_start" first when there is one, then glTF cameras
+    std::vector<DynamicPlace> dynamic_places;  // dimmer_dynamic on an empty node
+    std::vector<SceneModel> models;            // empty before listModels (models/scene_models.h)
     std::vector<PlayArea> play_areas;
     glm::vec3 sky_radiance_cd_m2{0};  // of the whole sky; with an image: what its texels are multiplied by
     // Equirectangular, rows from the top (+Y); the middle column is +X, to its right comes +Z. Null: a constant sky.

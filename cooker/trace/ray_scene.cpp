@@ -156,7 +156,8 @@ RayScene::RayScene(const Scene& scene) : scene_(scene) {
                                   .triangle = t,
                                   .material = mesh.triangle_materials[t],
                                   .normal = {},
-                                  .condition = mesh.door ? 2 * *mesh.door + mesh.is_open_leaf : no_condition});
+                                  .condition = mesh.door ? 2 * *mesh.door + mesh.is_open_leaf : no_condition,
+                                  .model = mesh.model.value_or(no_model)});
             const glm::vec3 a = corner(level_triangle, 0), b = corner(level_triangle, 1), c = corner(level_triangle, 2);
             triangles_.back().normal = glm::normalize(glm::cross(b - a, c - a));
             bounds_min_ = glm::min(bounds_min_, glm::min(a, glm::min(b, c)));
@@ -207,7 +208,7 @@ float RayScene::alphaAt(uint32_t triangle, float u, float v) const {
 }
 
 std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
-                                     Surfaces surfaces) const {
+                                     Surfaces surfaces, uint32_t ignored) const {
     const Embree& among = embree(surfaces);
     float near_m = 0;
     for (int layer = 0; layer < transparent_layers_max; ++layer) {
@@ -220,15 +221,31 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
                       .u = r.hit.u,
                       .v = r.hit.v,
                       .back = glm::dot(direction, triangles_[triangle].normal) > 0};
-        if (r.hit.geomID == 0) return hit;
-        if (unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v)) return hit;
+        const bool there = ignored == no_model || triangles_[triangle].model != ignored;
+        if (there && r.hit.geomID == 0) return hit;
+        if (there && unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v)) return hit;
         near_m = r.ray.tfar + step_past_m;
     }
     return std::nullopt;
 }
 
-float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces) const {
+float RayScene::transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
+                                     float distance_m) const {
+    float passed = 1, near_m = 0;
+    for (int layer = 0; layer < transparent_layers_max && passed > 0; ++layer) {
+        RTCRayHit r;
+        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_opaque | mask_transparent)) return passed;
+        const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
+        if (triangles_[triangle].model != model) passed *= 1 - alphaAt(triangle, r.hit.u, r.hit.v);
+        near_m = r.ray.tfar + step_past_m;
+    }
+    return 0;
+}
+
+float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces,
+                              uint32_t ignored) const {
     const Embree& among = embree(surfaces);
+    if (ignored != no_model) return transmittanceWithout(ignored, among, origin, direction, distance_m);
     if (among.occluded(origin, direction, distance_m, mask_opaque)) return 0;
     float passed = 1, near_m = 0;
     for (int layer = 0; among.anyTransparent() && layer < transparent_layers_max; ++layer) {

@@ -15,6 +15,9 @@ namespace dimmer::cook {
 // "Door d stands closed" is condition 2 d, "stands open" 2 d + 1; the other one of a pair is `condition ^ 1`.
 inline constexpr uint32_t no_condition = UINT32_MAX;
 
+// Of Scene::models. Rays for a model's probes pass through the model itself.
+inline constexpr uint32_t no_model = UINT32_MAX;
+
 // Beyond every level: how far a ray goes that nothing stops.
 inline constexpr float far_away_m = 1e30f;
 
@@ -25,6 +28,7 @@ struct LevelTriangle {
     uint32_t material = 0;
     glm::vec3 normal{0};                // geometric, unit
     uint32_t condition = no_condition;  // of a door's leaf: it is there while this holds
+    uint32_t model = no_model;          // that it belongs to
 };
 
 // What a ray meets: everything, with every leaf where it stands; only what is always there; or leaves alone.
@@ -56,13 +60,13 @@ class RayScene {
     RayScene& operator=(const RayScene&) = delete;
 
     // The nearest surface that stops the ray. A blended surface stops it with probability alpha, drawn from `seed`;
-    // a masked one where its alpha is at or above the cutoff.
+    // a masked one where its alpha is at or above the cutoff. `ignored`: a model that is not there.
     std::optional<Hit> nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
-                               Surfaces surfaces = Surfaces::All) const;
+                               Surfaces surfaces = Surfaces::All, uint32_t ignored = no_model) const;
 
     // The share of light, 0..1, that passes from `origin` along `direction` for `distance_m`.
-    float transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m,
-                        Surfaces surfaces = Surfaces::All) const;
+    float transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces = Surfaces::All,
+                        uint32_t ignored = no_model) const;
 
     // The surfaces of doors' leaves along a ray, nearest first, whether they stop it or not.
     LeafHits leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const;
@@ -85,6 +89,8 @@ class RayScene {
    private:
     struct Embree;
     const Embree& embree(Surfaces surfaces) const;
+    float transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
+                               float distance_m) const;
 
     const Scene& scene_;
     std::vector<LevelTriangle> triangles_;

@@ -6,6 +6,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <meshoptimizer.h>
 #include <sys/stat.h>
 #include <tbb/parallel_for.h>
 #include <unistd.h>
@@ -44,6 +45,8 @@ class Writer {
         if (!d_.probes.base.empty() || !d_.probes.local.empty()) addProbes(d_.probes);
         addTable(ChunkType::Meshes, [&](ByteWriter& out) { putMeshes(out); });
         addTable(ChunkType::Viewpoints, [&](ByteWriter& out) { putViewpoints(out); });
+        addTable(ChunkType::ModelMeshes, [&](ByteWriter& out) { putModelMeshes(out); });
+        addTable(ChunkType::Models, [&](ByteWriter& out) { putModels(out); });
         addTable(ChunkType::Settings, [&](ByteWriter& out) { out.putString(d_.settings_json); });
         compressAll();
         return assemble();
@@ -171,6 +174,50 @@ class Writer {
             out.put(v.position_m);
             out.put(v.forward);
             out.put(v.vertical_fov_rad);
+        }
+    }
+
+    static std::vector<std::byte> encoded(const std::vector<ModelVertex>& vertices) {
+        std::vector<std::byte> bytes(meshopt_encodeVertexBufferBound(vertices.size(), sizeof(ModelVertex)));
+        meshopt_encodeVertexVersion(0);
+        bytes.resize(meshopt_encodeVertexBuffer(reinterpret_cast<unsigned char*>(bytes.data()), bytes.size(),
+                                                vertices.data(), vertices.size(), sizeof(ModelVertex)));
+        return bytes;
+    }
+    static std::vector<std::byte> encoded(const std::vector<uint32_t>& indices, size_t vertices) {
+        std::vector<std::byte> bytes(meshopt_encodeIndexBufferBound(indices.size(), vertices));
+        meshopt_encodeIndexVersion(1);
+        bytes.resize(meshopt_encodeIndexBuffer(reinterpret_cast<unsigned char*>(bytes.data()), bytes.size(),
+                                               indices.data(), indices.size()));
+        return bytes;
+    }
+
+    void putModelMeshes(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.model_meshes.size()));
+        for (const ModelMesh& m : d_.model_meshes) {
+            out.putString(m.name);
+            out.put(m.min_m);
+            out.put(m.max_m);
+            out.put(m.reflectance);
+            out.put(m.emission_cd_m2);
+            putOptional(out, m.emission_set);
+            out.put(static_cast<uint32_t>(m.vertices.size()));
+            out.putArray(std::span<const std::byte>(encoded(m.vertices)));
+            out.put(static_cast<uint32_t>(m.indices.size()));
+            out.putArray(std::span<const std::byte>(encoded(m.indices, m.vertices.size())));
+        }
+    }
+
+    void putModels(ByteWriter& out) const {
+        out.put(static_cast<uint32_t>(d_.models.size()));
+        for (const PlacedModel& m : d_.models) {
+            out.putString(m.node);
+            out.put(m.first_mesh);
+            out.put(m.mesh_count);
+            putOptional(out, m.local_grid);
+            out.put(m.world_from_model);
+            out.put(m.min_m);
+            out.put(m.max_m);
         }
     }
 

@@ -1,4 +1,5 @@
-// What one draw call gets as push constants: shared by C++ (level_renderer.cpp, sphere_renderer.cpp) and GLSL.
+// What one draw call gets as push constants: shared by C++ (level_renderer.cpp, sphere_renderer.cpp,
+// model_renderer.cpp) and GLSL.
 #ifndef DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
 #define DIMMER_SAMPLE_DRAW_CONSTANTS_GLSL
 
@@ -25,6 +26,14 @@ struct SphereConstants {
     mat4 clip_from_world;
     float exposure;
     uint color_format;  // Pack::colorFormat()
+};
+
+// For all models.
+struct ModelConstants {
+    mat4 clip_from_world;
+    float exposure;
+    uint color_format;     // Pack::colorFormat()
+    uint self_visibility;  // 0: without the models' shadows on themselves
 };
 
 #ifdef __cplusplus

@@ -63,6 +63,8 @@ class ByteReader {
     // True when `count` items of at least `item_bytes` can still follow: bounds an allocation by the file.
     bool fits(uint64_t count, uint64_t item_bytes) const { return ok_ && count <= rest_.size() / item_bytes; }
     bool ok() const { return ok_; }
+    // What was read makes no sense.
+    void fail() { ok_ = false; }
     bool atEnd() const { return ok_ && rest_.empty(); }
 
    private:

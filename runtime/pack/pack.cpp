@@ -2,6 +2,7 @@
 
 #include <pack/pack_data.h>
 #include <pack/pack_reader.h>
+#include <probes/model_slots.h>
 
 #include <fmt/format.h>
 
@@ -59,6 +60,15 @@ std::span<const Mesh> Pack::meshes() const {
 }
 std::span<const Viewpoint> Pack::viewpoints() const {
     return data_->viewpoints;
+}
+std::span<const PlacedModel> Pack::models() const {
+    return data_->models;
+}
+std::span<const ModelMesh> Pack::modelMeshes() const {
+    return data_->model_meshes;
+}
+ModelSlot Pack::localGridSlot(uint32_t local_grid) const {
+    return slotOf(data_->probes.local[local_grid]);
 }
 uint32_t Pack::pageCount() const {
     return data_->page_count;

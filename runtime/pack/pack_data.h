@@ -96,6 +96,8 @@ struct PackData {
     ProbeData probes;
     std::vector<Mesh> meshes;
     std::vector<Viewpoint> viewpoints;
+    std::vector<ModelMesh> model_meshes;
+    std::vector<PlacedModel> models;
     std::string settings_json;  // every resolved setting of the cook and where it came from
 
     ReceiverView texelView() const { return {clusters, terms, batches, sizeof(TexelRecord)}; }

@@ -5,6 +5,7 @@
 #include <format/layout.h>
 
 #include <pack/decompress.h>
+#include <pack/mesh_codec.h>
 
 #include <fmt/format.h>
 
@@ -73,6 +74,8 @@ class Reader {
         then([&] { return readProbes(d); });
         then([&] { return table(ChunkType::Meshes, [&](ByteReader& in) { readMeshes(in, d); }); });
         then([&] { return table(ChunkType::Viewpoints, [&](ByteReader& in) { readViewpoints(in, d); }); });
+        then([&] { return table(ChunkType::ModelMeshes, [&](ByteReader& in) { readModelMeshes(in, d); }); });
+        then([&] { return table(ChunkType::Models, [&](ByteReader& in) { readModels(in, d); }); });
         then([&] { return table(ChunkType::Settings, [&](ByteReader& in) { d.settings_json = in.getString(); }); });
         then([&] { return checkNothingLeft(); });
         if (!ok) return std::unexpected(ok.error());
@@ -146,6 +149,8 @@ class Reader {
             case ChunkType::LocalGrids:
             case ChunkType::Meshes:
             case ChunkType::Viewpoints:
+            case ChunkType::ModelMeshes:
+            case ChunkType::Models:
             case ChunkType::Settings:
                 return true;
         }
@@ -306,6 +311,44 @@ class Reader {
             v.forward = in.get<std::array<float, 3>>();
             v.vertical_fov_rad = in.get<float>();
             d.viewpoints.push_back(std::move(v));
+        }
+    }
+
+    static void readModelMeshes(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 72)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            ModelMesh m;
+            m.name = in.getString();
+            m.min_m = in.get<std::array<float, 3>>();
+            m.max_m = in.get<std::array<float, 3>>();
+            m.reflectance = in.get<std::array<float, 3>>();
+            m.emission_cd_m2 = in.get<std::array<float, 3>>();
+            m.emission_set = optionalIndex(in);
+            const uint32_t vertex_count = in.get<uint32_t>();
+            auto vertices = decodeVertices(vertex_count, in.getArray<std::byte>());
+            const uint32_t index_count = in.get<uint32_t>();
+            auto indices = decodeIndices(index_count, in.getArray<std::byte>());
+            if (!vertices || !indices) return in.fail();
+            m.vertices = std::move(*vertices);
+            m.indices = std::move(*indices);
+            d.model_meshes.push_back(std::move(m));
+        }
+    }
+
+    static void readModels(ByteReader& in, PackData& d) {
+        const uint32_t count = in.get<uint32_t>();
+        if (!in.fits(count, 88)) return;
+        for (uint32_t i = 0; i < count && in.ok(); ++i) {
+            PlacedModel m;
+            m.node = in.getString();
+            m.first_mesh = in.get<uint32_t>();
+            m.mesh_count = in.get<uint32_t>();
+            m.local_grid = optionalIndex(in);
+            m.world_from_model = in.get<Transform>();
+            m.min_m = in.get<std::array<float, 3>>();
+            m.max_m = in.get<std::array<float, 3>>();
+            d.models.push_back(std::move(m));
         }
     }
 

@@ -267,11 +267,36 @@ Expected<void> validateMeshes(const PackData& d) {
     return {};
 }
 
+Expected<void> validateModels(const PackData& d) {
+    for (const ModelMesh& m : d.model_meshes) {
+        if (!finite(m.min_m) || !finite(m.max_m) || !finite(m.reflectance) || !finite(m.emission_cd_m2))
+            return bad("the mesh of model '{}' has a box or colour that is not finite", m.name);
+        const bool no_set = m.emission_set && (*m.emission_set >= d.elements.size() ||
+                                               d.elements[*m.emission_set].kind != ElementKind::LightSet);
+        if (no_set) return bad("the mesh of model '{}' shines with no such light set", m.name);
+        if (m.indices.size() % 3 != 0) return bad("the mesh of model '{}' has a broken triangle", m.name);
+        if (!std::ranges::all_of(m.indices, [&](uint32_t i) { return i < m.vertices.size(); }))
+            return bad("the mesh of model '{}' has an index past its vertices", m.name);
+    }
+    for (const PlacedModel& m : d.models) {
+        if (m.first_mesh > d.model_meshes.size() || m.mesh_count > d.model_meshes.size() - m.first_mesh)
+            return bad("model '{}' has meshes that are not there", m.node);
+        if (m.local_grid &&
+            (*m.local_grid >= d.probes.local.size() || d.probes.local[*m.local_grid].first_probe == no_probe))
+            return bad("model '{}' has a light grid that is not there", m.node);
+        if (!std::ranges::all_of(m.world_from_model.rows, [](const auto& row) { return finite(row); }) ||
+            !finite(m.min_m) || !finite(m.max_m))
+            return bad("model '{}' stands nowhere", m.node);
+    }
+    return {};
+}
+
 }  // namespace
 
 Expected<void> validate(const PackData& data) {
-    for (auto* check : {validatePages, validateElements, validateContributions, validateTexels, validateAddresses,
-                        validateBatchTiles, validateProbes, validateGlobalGrid, validateLocalGrids, validateMeshes})
+    for (auto* check :
+         {validatePages, validateElements, validateContributions, validateTexels, validateAddresses, validateBatchTiles,
+          validateProbes, validateGlobalGrid, validateLocalGrids, validateMeshes, validateModels})
         if (auto ok = check(data); !ok) return ok;
     return {};
 }

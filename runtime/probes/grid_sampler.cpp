@@ -27,10 +27,13 @@ void add(const ProbeRecord& record, ColorFormat format, float weight, Radiance& 
 }  // namespace
 
 std::array<float, 3> irradiance(const Radiance& radiance, std::array<float, 3> normal) {
-    const auto y = sphericalHarmonics(normal);
+    return transferredIrradiance(radiance, normalTransfer(normal));
+}
+
+std::array<float, 3> transferredIrradiance(const Radiance& radiance, const LightTransfer& transfer) {
     std::array<float, 3> sum = {};
     for (size_t i = 0; i < sh_count; ++i)
-        for (size_t c = 0; c < 3; ++c) sum[c] += cosine_bands[bandOf(i)] * y[i] * radiance.coefficients[i][c];
+        for (size_t c = 0; c < 3; ++c) sum[c] += transfer.coefficients[i] * radiance.coefficients[i][c];
     for (float& v : sum) v = std::max(v, 0.0f);
     return sum;
 }
@@ -84,6 +87,11 @@ Radiance GridSampler::radiance(const ModelSlot& slot, std::array<float, 3> point
         if (weight > 0) add(probeAt(probes_, number), data.color_format, weight / data.exposure, sum);
     }
     return sum;
+}
+
+std::array<float, 3> GridSampler::sampleTransfer(const ModelSlot& slot, std::array<float, 3> point_m,
+                                                 const LightTransfer& transfer) const {
+    return transferredIrradiance(radiance(slot, point_m), transfer);
 }
 
 std::array<float, 3> GridSampler::sample(const ModelSlot& slot, std::array<float, 3> point_m,

@@ -127,6 +127,32 @@ ModelGrid modelGrid(std::array<float, 3> min_m, std::array<float, 3> max_m, floa
     }
 }
 
+ModelSlot slotOf(const LocalGrid& grid) {
+    ModelSlot slot{grid.first_probe, grid.counts, {}};
+    Transform world_from_grid;
+    for (size_t r = 0; r < 3; ++r) {
+        for (size_t axis = 0; axis < 3; ++axis) world_from_grid.rows[r][axis] = grid.step_m[axis][r];
+        world_from_grid.rows[r][3] = grid.origin_m[r];
+    }
+    const bool flat = determinant(world_from_grid) == 0 || std::ranges::find(grid.counts, 1u) != grid.counts.end();
+    const Transform inverted = flat ? Transform{} : inverse(world_from_grid);
+    for (size_t axis = 0; axis < 3; ++axis) {
+        auto& row = slot.grid_from_world[axis];
+        const Vec3& step = grid.step_m[axis];
+        const float squares = step[0] * step[0] + step[1] * step[1] + step[2] * step[2];
+        if (!flat) {
+            row = inverted.rows[axis];
+        } else if (squares > 0 && grid.counts[axis] > 1) {  // as if its axes were perpendicular
+            for (size_t i = 0; i < 3; ++i) {
+                row[i] = step[i] / squares;
+                row[3] -= row[i] * grid.origin_m[i];
+            }
+        }
+        if (!std::ranges::all_of(row, [](float v) { return std::isfinite(v); })) row = {};
+    }
+    return slot;
+}
+
 std::vector<Box> boxesOfClusters(const PackData& data) {
     const GlobalGrid& global = data.probes.global;
     std::vector<Box> of_probe(global.positions.size(), empty_box);

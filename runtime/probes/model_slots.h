@@ -25,6 +25,9 @@ struct Box {
 // them. Clusters without global probes have an empty box.
 std::vector<Box> boxesOfClusters(const PackData& data);
 
+// Where a grid's probes are. An axis along which it has one probe, or no length, is flat: all of it is that probe.
+ModelSlot slotOf(const LocalGrid& grid);
+
 // What taking a probe anew moves at least: its tetrahedron, the places and light of the four corners, hint and result.
 inline constexpr uint64_t resample_bytes_read = 48 + 4 * (16 + sizeof(ProbeRecord)) + sizeof(uint32_t);
 inline constexpr uint64_t resample_bytes_written = sizeof(ProbeRecord) + sizeof(uint32_t);

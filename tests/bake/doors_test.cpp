@@ -85,7 +85,7 @@ TEST(DoorRays, PartAtLeavesThatLetSomeLightThrough) {
     const RayScene rays(scene);
     const auto ways = [&](const DoorPaths& paths, float distance) {
         std::map<uint32_t, float> found;
-        forEachWay(rays, paths, no_condition, {0, 0.1f, 0.2f}, {1, 0, 0}, distance,
+        forEachWay(rays, paths, no_condition, no_model, {0, 0.1f, 0.2f}, {1, 0, 0}, distance,
                    [&](float share, uint32_t path) { found[path] += share; });
         return found;
     };

@@ -17,8 +17,8 @@ using testing::UnorderedElementsAre;
 constexpr const char* quick_profile = R"({"bake": {"draft":
     {"samples_per_texel": 2, "series_rays": 8, "rays": 128, "emitter_samples": 2, "noise": 0.2, "bounces": 8}}})";
 
-// Two rooms with a door between, lamps of three sets, one of them red and partly emissive: everything that terms can
-// depend on.
+// Two rooms with a door between, lamps of three sets, one of them red and partly emissive, and a shelf with a light
+// grid of its own: everything that terms can depend on.
 LevelFile houseOfTwo() {
     LevelFile level = twoCells();
     const int white = addWhite(level), glow = addWhite(level, {{"emissiveFactor", {1, 0.5, 0.1}}});
@@ -30,6 +30,11 @@ LevelFile houseOfTwo() {
     level.addNode({{"name", "leaf"},
                    {"mesh", addRoomMesh(level, {0.9f, 0.2f, 1.2f}, 0.6f, white)},
                    {"extras", {{"dimmer_door", "flap"}}}});
+    level.addNode({{"name", "shelf"},
+                   {"mesh", level.addSquareMesh(white)},
+                   {"translation", {0.5, 0.6, 1.5}},
+                   {"scale", {0.3, 0.3, 0.3}},
+                   {"extras", {{"dimmer_lighting", "local_grid"}}}});
     level.document["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = {1, 0.2, 0.1};
     return level;
 }

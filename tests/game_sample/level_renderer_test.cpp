@@ -2,6 +2,7 @@
 #include <format/texel.h>
 #include <game_sample/balls.h>
 #include <game_sample/level_renderer.h>
+#include <game_sample/model_renderer.h>
 #include <game_sample/player.h>
 #include <gpu/headless_device.h>
 #include <gtest/gtest.h>
@@ -56,7 +57,8 @@ PackData wall(bool faces_viewer) {
 
 // One frame seen from the origin along -Z, with `weight` on the lamp, once the script's balls have reached
 // `frame_number`.
-glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script = {}, uint32_t frame_number = 0) {
+glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script = {}, uint32_t frame_number = 0,
+                      bool self_visibility = true) {
     const auto pack = Pack::fromData(data);
     EXPECT_TRUE(pack);
     const auto device = HeadlessDevice::create({.validation = true, .graphics = true});
@@ -64,10 +66,12 @@ glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script 
     const VulkanContext vulkan = device->context();
     glm::vec3 middle{-1};
     {
-        auto lights = Runtime::create(vulkan, *pack, {.moving_probes_max = movingProbes(script)});
+        auto lights = Runtime::create(vulkan, *pack, {.moving_probes_max = movingProbes(script) + movingProbes(*pack)});
         EXPECT_TRUE(lights && lights->setWeight(*lights->lightSet("lamp"), weight));
         auto renderer = LevelRenderer::create(vulkan, *pack, lights->images(), {16, 8});
         EXPECT_TRUE(renderer);
+        auto models = ModelRenderer::create(vulkan, *lights, renderer->renderPass(), {16, 8}, self_visibility);
+        EXPECT_TRUE(models && models->move(0, *lights));
         auto balls = Balls::create(script, *lights);
         EXPECT_TRUE(balls && balls->move(frame_number, *lights));
         std::optional<SphereRenderer> spheres;
@@ -86,6 +90,7 @@ glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script 
         EXPECT_TRUE(lights->record(commands));
         renderer->record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, *lights,
                          [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
+                             EXPECT_TRUE(models->draw(pass, clip_from_world, *lights));
                              if (spheres) spheres->draw(pass, clip_from_world, *balls->spheres(*lights));
                          });
         vkEndCommandBuffer(commands);
@@ -133,6 +138,55 @@ TEST(SampleLevelRenderer, ABallIsLitByTheLightGridWhereItIs) {
     expectRadiance(middlePixel(data, 1, script, 10), {0.5f * e_pi, 0.25f * e_pi + 8, 0.75f * e_pi});
     EXPECT_EQ(placeOf(script.balls[0], 20), script.balls[0].from_m);
     EXPECT_EQ(placeOf(script.balls[0], 30), script.balls[0].to_m);
+}
+
+// A plate 1 m in front of the viewer in 40 lux from all sides, of which its vertices see half. It stands, or it moves
+// and takes the same light from the global grid; drawn by one path.
+TEST(SampleLevelRenderer, AModelIsLitByItsGridAndShadowsItself) {
+    constexpr float plate_lux = 40, pi = std::numbers::pi_v<float>;
+    const float stored = std::sqrt(4 * pi) * plate_lux / pi * exposure;
+    for (const bool moves : {false, true}) {
+        PackData data = wall(true);
+        ModelMesh mesh;
+        mesh.name = "plate";
+        mesh.min_m = {-0.5f, -0.5f, 0};
+        mesh.max_m = {0.5f, 0.5f, 0};
+        mesh.reflectance = {0.5f, 0.25f, 0.75f};
+        mesh.emission_cd_m2 = {0, 0, 8};
+        mesh.emission_set = 0;
+        for (const auto& [x, y] : {std::pair<uint16_t, uint16_t>{0, 0}, {65535, 0}, {65535, 65535}, {0, 65535}}) {
+            ModelVertex vertex;
+            vertex.position = {x, y, 0};  // its octahedral normal, 0 and 0, is +Z
+            vertex.transfer[0] = 64;      // half of 127, to 1 %
+            mesh.vertices.push_back(vertex);
+        }
+        mesh.indices = {0, 1, 2, 0, 2, 3};
+        data.model_meshes = {mesh};
+        data.models.resize(1);
+        data.models[0].mesh_count = 1;
+        data.models[0].world_from_model.rows[2][3] = -1;
+        data.models[0].min_m = {-0.5f, -0.5f, -0.1f};
+        data.models[0].max_m = {0.5f, 0.5f, 0.1f};
+        if (moves) {
+            std::vector<glm::vec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -2}};
+            data.probes.global = cook::tetrahedralise(points, {glm::vec3(-5), glm::vec3(5)}).value();
+        } else {
+            data.models[0].local_grid = 0;
+            data.probes.local = {
+                {"plate", 0, {2, 2, 2}, {-0.5f, -0.5f, -1.1f}, {{{1, 0, 0}, {0, 1, 0}, {0, 0, 0.2f}}}}};
+        }
+        data.probes.base.assign(moves ? data.probes.global.positions.size() : 8,
+                                {encodeR11G11B10(stored, stored, stored), {}});
+        data.probes.record_counts = {0};
+        const float whole = plate_lux / pi;
+        const glm::vec3 shadowed = middlePixel(data, 0.5f), plain = middlePixel(data, 0.5f, {}, 0, false);
+        const glm::vec3 reflectance(0.5f, 0.25f, 0.75f), emission(0, 0, 4);
+        for (int c = 0; c < 3; ++c) {
+            // Roundings of the probes to 5 or 6 bits, as above, and of the transfer.
+            EXPECT_NEAR(shadowed[c], reflectance[c] * 0.5f * whole + emission[c], whole / 32) << moves;
+            EXPECT_NEAR(plain[c], reflectance[c] * whole + emission[c], whole / 32) << moves;
+        }
+    }
 }
 
 TEST(SampleLevelRenderer, EmissionFollowsItsSet) {

@@ -60,6 +60,19 @@ const ContentFault content_faults[] = {
     {"meshes: NaN", [](PackFile& f) { f.chunk("MESH").write(53, NAN); }, "mesh 'floor' has a vertex"},
     {"viewpoints: a huge count", [](PackFile& f) { f.chunk("VIEW").write(0, UINT32_MAX); }, "VIEW is malformed"},
     {"viewpoints: NaN", [](PackFile& f) { f.chunk("VIEW").write(20, NAN); }, "viewpoint 'player_start'"},
+    {"model meshes: a huge count", [](PackFile& f) { f.chunk("MODM").write(0, UINT32_MAX); }, "MODM is malformed"},
+    {"model meshes: cut short", [](PackFile& f) { f.chunk("MODM").bytes.pop_back(); }, "MODM is malformed"},
+    {"model meshes: NaN", [](PackFile& f) { f.chunk("MODM").write(14, NAN); }, "the mesh of model 'barrel'"},
+    {"model meshes: no such set", [](PackFile& f) { f.chunk("MODM").write(62, 4u); }, "no such light set"},
+    {"model meshes: more vertices", [](PackFile& f) { f.chunk("MODM").write(66, 300u); }, "MODM is malformed"},
+    {"model meshes: a huge number", [](PackFile& f) { f.chunk("MODM").write(66, UINT32_MAX); }, "MODM is malformed"},
+    {"model meshes: another codec", [](PackFile& f) { f.chunk("MODM").write(74, std::byte{0}); }, "MODM is malformed"},
+    {"models: a huge count", [](PackFile& f) { f.chunk("MODL").write(0, UINT32_MAX); }, "MODL is malformed"},
+    {"models: cut short", [](PackFile& f) { f.chunk("MODL").bytes.pop_back(); }, "MODL is malformed"},
+    {"models: no such mesh", [](PackFile& f) { f.chunk("MODL").write(20, 3u); }, "model 'barrel_place' has meshes"},
+    {"models: too many", [](PackFile& f) { f.chunk("MODL").write(24, UINT32_MAX); }, "model 'barrel_place' has meshes"},
+    {"models: no such grid", [](PackFile& f) { f.chunk("MODL").write(28, 0u); }, "'barrel_place' has a light grid"},
+    {"models: NaN", [](PackFile& f) { f.chunk("MODL").write(32, NAN); }, "model 'barrel_place' stands nowhere"},
     {"settings: a huge text", [](PackFile& f) { f.chunk("SETT").write(0, UINT32_MAX); }, "SETT is malformed"},
     {"header: no pages", [](PackFile& f) { f.header.page_count = 0; }, "0 pages"},
     {"header: huge pages", [](PackFile& f) { f.header.page_width = UINT32_MAX; }, "pages of 4294967295"},
@@ -118,6 +131,15 @@ void run(const Pack& pack) {
         for (const MeshVertex& v : mesh.vertices)
             sampleLightmap(pack, runtime.irradiancePages(), runtime.directionPages(), mesh.page, v.lightmap_uv,
                            {0, 0, 1});
+    for (const ModelMesh& mesh : pack.modelMeshes())
+        for (const uint32_t i : mesh.indices) {
+            EXPECT_TRUE(std::isfinite(modelNormal(mesh.vertices[i])[0]));
+            modelPosition(mesh, mesh.vertices[i]);
+        }
+    for (const PlacedModel& model : pack.models())
+        for (uint32_t m = 0; m < model.mesh_count; ++m)
+            for (const ModelVertex& v : pack.modelMeshes()[model.first_mesh + m].vertices)
+                modelTransfer(v, model.world_from_model);
 }
 
 // Whatever is accepted must be safe to run: the sanitizers watch the second half of this test.

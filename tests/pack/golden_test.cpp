@@ -28,6 +28,15 @@ void expectContent(const Pack& pack) {
     ASSERT_EQ(pack.meshes().size(), 1u);
     EXPECT_EQ(pack.meshes()[0].node, "floor");
     EXPECT_EQ(pack.viewpoints()[0].position_m, (std::array<float, 3>{1, 2, 3}));
+    ASSERT_EQ(pack.models().size(), 2u);
+    EXPECT_EQ(pack.models()[0].node, "barrel_place");
+    ASSERT_EQ(pack.models()[1].mesh_count, 2u);
+    const ModelMesh& barrel = pack.modelMeshes()[0];
+    EXPECT_EQ(barrel.indices, (std::vector<uint32_t>{0, 1, 2, 2, 1, 3, 2, 3, 4}));
+    // 13000 steps of 2 m / 65535, and what the bytes 127 and -127 stand for.
+    EXPECT_NEAR(modelPosition(barrel, barrel.vertices[1])[1], 0.3967346f, 1e-6f);
+    EXPECT_EQ(modelTransfer(barrel.vertices[0], {}).coefficients[0], transfer_bounds[0]);
+    EXPECT_EQ(modelTransfer(barrel.vertices[0], {}).coefficients[1], -transfer_bounds[1]);
     CpuRuntime runtime(pack);
     ASSERT_TRUE(runtime.apply("hall=0.5,door:front=1"));
     EXPECT_EQ(runtime.update().receivers, 2u);

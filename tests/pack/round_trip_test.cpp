@@ -41,6 +41,17 @@ void expectEqual(const Mesh& a, const Mesh& b) {
     EXPECT_EQ(a.indices, b.indices);
 }
 
+void expectEqual(const ModelMesh& a, const ModelMesh& b) {
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.min_m, b.min_m);
+    EXPECT_EQ(a.max_m, b.max_m);
+    EXPECT_EQ(a.reflectance, b.reflectance);
+    EXPECT_EQ(a.emission_cd_m2, b.emission_cd_m2);
+    EXPECT_EQ(a.emission_set, b.emission_set);
+    EXPECT_EQ(a.vertices, b.vertices);
+    EXPECT_EQ(a.indices, b.indices);
+}
+
 void expectEqual(const PackData& a, const PackData& b) {
     EXPECT_EQ(a.exposure, b.exposure);
     EXPECT_EQ(a.page_width, b.page_width);
@@ -74,6 +85,18 @@ void expectEqual(const PackData& a, const PackData& b) {
         EXPECT_EQ(a.viewpoints[i].position_m, b.viewpoints[i].position_m);
         EXPECT_EQ(a.viewpoints[i].forward, b.viewpoints[i].forward);
         EXPECT_EQ(a.viewpoints[i].vertical_fov_rad, b.viewpoints[i].vertical_fov_rad);
+    }
+    ASSERT_EQ(a.model_meshes.size(), b.model_meshes.size());
+    for (size_t i = 0; i < a.model_meshes.size(); ++i) expectEqual(a.model_meshes[i], b.model_meshes[i]);
+    ASSERT_EQ(a.models.size(), b.models.size());
+    for (size_t i = 0; i < a.models.size(); ++i) {
+        EXPECT_EQ(a.models[i].node, b.models[i].node);
+        EXPECT_EQ(a.models[i].first_mesh, b.models[i].first_mesh);
+        EXPECT_EQ(a.models[i].mesh_count, b.models[i].mesh_count);
+        EXPECT_EQ(a.models[i].local_grid, b.models[i].local_grid);
+        EXPECT_EQ(a.models[i].world_from_model.rows, b.models[i].world_from_model.rows);
+        EXPECT_EQ(a.models[i].min_m, b.models[i].min_m);
+        EXPECT_EQ(a.models[i].max_m, b.models[i].max_m);
     }
     EXPECT_EQ(a.settings_json, b.settings_json);
 }
@@ -156,7 +179,7 @@ TEST(PackLayout, HeaderAndTable) {
     EXPECT_EQ(at<uint32_t>(bytes, 40), 32u);
     EXPECT_EQ(at<uint32_t>(bytes, 44), 2u);
     const uint32_t count = at<uint32_t>(bytes, 48);
-    EXPECT_EQ(count, 10 + data.contributions.size());
+    EXPECT_EQ(count, 12 + data.contributions.size());
 
     auto hashed = bytes;
     hashed.resize(64 + 48 * count);

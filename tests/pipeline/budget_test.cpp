@@ -28,7 +28,8 @@ TEST(Budget, CostsAreSums) {
     EXPECT_EQ(cost.dynamic, 8 * (records + receivers));
     EXPECT_GE(cost.ancillary, receivers);  // a byte each says where it is
     EXPECT_EQ(cost.device(), cost.base_lightmap + cost.dynamic + cost.global_grid + cost.ancillary);
-    EXPECT_EQ(cost.meshes, 2u * (4 * 32 + 6 * 4));  // two squares
+    // Two squares with lightmaps, two meshes of models.
+    EXPECT_EQ(cost.meshes, 2u * (4 * 32 + 6 * 4) + 2u * (5 * 20 + 9 * 4));
 }
 
 TEST(Budget, AnElementHoldsEveryContributionThatNamesIt) {

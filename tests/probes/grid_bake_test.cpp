@@ -87,7 +87,7 @@ TEST(GridBake, DirectLightOfFullLampsAlone) {
 }
 
 // Two rooms, a wall of 10 cm, one lamp: what points of the dark room get, as a share of the lit room's mean.
-double leak(bool visibility) {
+double leak(bool visibility, uint32_t seed) {
     Scene scene;
     const uint32_t white = addMaterial(scene, lambert(0.6f));
     addRoom(scene, {0, 0, 0}, {4, 2.6f, 4}, white);
@@ -96,6 +96,7 @@ double leak(bool visibility) {
     BakedScene level(scene, 2);
     BakeSettings settings = settingsWithGrid();
     settings.grid.visibility = visibility;
+    settings.seed = seed;
     level.bake(settings);
     const BakedGrid& baked = level.baked.grid;
     double lit = 0, dark = 0;
@@ -118,7 +119,14 @@ double leak(bool visibility) {
 }
 
 TEST(GridBake, LightStaysInItsRoom) {
-    const double with = leak(true), without = leak(false);
+    // Where the few probes of so small a level stand is a matter of luck: one placement tells little (the worst of
+    // twelve leaked 1.7 %, docs/measurements.md).
+    double with = 0, without = 0;
+    constexpr uint32_t placements = 4;
+    for (uint32_t seed = 1; seed <= placements; ++seed) {
+        with += leak(true, seed) / placements;
+        without += leak(false, seed) / placements;
+    }
     printf("leak through a wall of 10 cm: %.2f %% of the lit room's mean, without visibility %.2f %%\n", 100 * with,
            100 * without);
     EXPECT_LE(with, 0.01);
@@ -207,13 +215,14 @@ TEST(GlobalGridSetting, IsMadeWhereSomethingMoves) {
     EXPECT_FALSE(wantsGrid(profile, scene));
     scene.meshes.emplace_back().lighting = Lighting::Lightmap;
     EXPECT_FALSE(wantsGrid(profile, scene));
-    for (const Lighting lighting : {Lighting::Dynamic, Lighting::LocalGrid}) {
-        Scene moving = scene;
-        moving.meshes.emplace_back().lighting = lighting;
-        EXPECT_TRUE(wantsGrid(profile, moving));
-    }
+    // Models that stand have grids of their own.
+    Scene standing = scene, moving = scene;
+    standing.meshes.emplace_back().lighting = Lighting::LocalGrid;
+    moving.meshes.emplace_back().lighting = Lighting::Dynamic;
+    EXPECT_FALSE(wantsGrid(profile, standing));
+    EXPECT_TRUE(wantsGrid(profile, moving));
     Scene marked = scene, played = scene;
-    marked.dynamic_places_m.emplace_back(0);
+    marked.dynamic_places.emplace_back();
     played.play_areas.emplace_back();
     EXPECT_TRUE(wantsGrid(profile, marked));
     EXPECT_TRUE(wantsGrid(profile, played));

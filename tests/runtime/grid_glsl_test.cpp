@@ -22,9 +22,11 @@ using Vec4 = std::array<float, 4>;
 struct GridQuery {
     Vec4 position;  // w: exposure
     Vec4 normal;    // w: colour format
+    std::array<Vec4, 3> transfer;
+    std::array<Vec4, 3> world_from_model;  // rows
 };
 struct Result {
-    Vec4 model_lux, grid_lux;
+    Vec4 model_lux, grid_lux, shadowed_lux;
 };
 
 std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime, const ModelSlot& slot,
@@ -85,12 +87,18 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
         cpu.update();
 
         std::vector<GridQuery> queries(2000);
+        std::vector<ModelVertex> vertices;
         for (GridQuery& q : queries) {
             const float z = test::uniform(random, -1, 1), angle = test::uniform(random, 0, 6.2831853f);
             const float r = std::sqrt(1 - z * z);
             q = {{test::uniform(random, 2, 8), test::uniform(random, -1, 4), test::uniform(random, 3, 9),
                   pack.exposure()},
-                 {r * std::cos(angle), r * std::sin(angle), z, static_cast<float>(format)}};
+                 {r * std::cos(angle), r * std::sin(angle), z, static_cast<float>(format)},
+                 {},
+                 place.rows};
+            vertices.push_back(test::randomModelVertex(random));
+            for (size_t k = 0; k < 9; ++k)
+                q.transfer[k / 4][k % 4] = std::max(static_cast<float>(vertices.back().transfer[k]) / 127, -1.0f);
         }
         const auto results = onDevice(device().context(), gpu, slot, queries);
         const GridSampler sampler(pack, cpu.probes());
@@ -98,6 +106,7 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
             const std::array<float, 3> p = {queries[i].position[0], queries[i].position[1], queries[i].position[2]};
             const std::array<float, 3> n = {queries[i].normal[0], queries[i].normal[1], queries[i].normal[2]};
             const auto model_lux = sampler.sample(slot, p, n), grid_lux = sampler.sample(p, n);
+            const auto shadowed_lux = sampler.sampleTransfer(slot, p, modelTransfer(vertices[i], place));
             const auto model_light = sampler.radiance(slot, p), grid_light = sampler.radiance(p);
             for (size_t c = 0; c < 3; ++c) {
                 // Nine terms as large as L_00 times sqrt 5 each, rounded at 6e-8 some twenty times.
@@ -105,6 +114,7 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
                 const float grid_tolerance = 1e-4f * grid_light.coefficients[0][c] + 1e-12f;
                 ASSERT_NEAR(results[i].model_lux[c], model_lux[c], model_tolerance) << i;
                 ASSERT_NEAR(results[i].grid_lux[c], grid_lux[c], grid_tolerance) << i;
+                ASSERT_NEAR(results[i].shadowed_lux[c], shadowed_lux[c], model_tolerance) << i;
             }
         }
     }

@@ -246,4 +246,12 @@ inline std::string randomState(const PackData& data, Random& random) {
     return state;
 }
 
+inline ModelVertex randomModelVertex(Random& random) {
+    ModelVertex v;
+    for (auto& p : v.position) p = static_cast<uint16_t>(random());
+    for (auto& n : v.normal) n = static_cast<int16_t>(random());
+    for (auto& t : v.transfer) t = static_cast<int8_t>(random());
+    return v;
+}
+
 }  // namespace dimmer::test

@@ -307,7 +307,7 @@ TEST(SceneElements, HowMeshesReceiveLight) {
         EXPECT_EQ(scene->meshes[0].lighting, lighting) << extras;
         EXPECT_EQ(scene->meshes[0].texels_per_metre, 16.0f);
         EXPECT_EQ(scene->meshes[0].grid_spacing_m, 0.5f);
-        EXPECT_TRUE(scene->dynamic_places_m.empty());
+        EXPECT_TRUE(scene->dynamic_places.empty());
     }
     LevelFile contradiction = LevelFile::withFloor();
     contradiction.node(0)["extras"] = {{"dimmer_dynamic", 1}, {"dimmer_lighting", "lightmap"}};
@@ -320,8 +320,8 @@ TEST(SceneElements, EmptyNodesArePlacesAndPlayAreasAreNoGeometry) {
     level.addNode({{"name", "area"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_play_area", 1}}}});
     const auto scene = level.import();
     ASSERT_IMPORTED(scene);
-    ASSERT_EQ(scene->dynamic_places_m.size(), 1u);
-    EXPECT_EQ(scene->dynamic_places_m[0], glm::vec3(1, 2, 3));
+    ASSERT_EQ(scene->dynamic_places.size(), 1u);
+    EXPECT_EQ(glm::dvec3(scene->dynamic_places[0].world_from_node[3]), glm::dvec3(1, 2, 3));
     EXPECT_EQ(scene->meshes.size(), 1u);
 }
 

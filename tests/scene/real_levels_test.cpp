@@ -64,7 +64,7 @@ TEST_P(RealLevel, HasWhatItsReadmeSays) {
                   std::ranges::count_if(scene->lights, [](const auto& l) { return l.light_set.has_value(); })),
               expected.lights_in_sets);
     EXPECT_EQ(scene->doors.size(), expected.doors);
-    EXPECT_EQ(scene->dynamic_places_m.size(), expected.dynamic);
+    EXPECT_EQ(scene->dynamic_places.size(), expected.dynamic);
     EXPECT_EQ(scene->sky_radiance_cd_m2 != glm::vec3(0), expected.sky);
     ASSERT_FALSE(scene->viewpoints.empty());
     EXPECT_EQ(scene->viewpoints[0].name, "player_start");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <dimmer/error.h>
+#include <dimmer/model_mesh.h>
 
 #include <array>
 #include <cstddef>
@@ -52,7 +53,7 @@ struct MeshVertex {
     std::array<float, 2> lightmap_uv;  // 0..1 over the page
 };
 
-// A mesh of the level, in world space, with its final lightmap UVs.
+// A mesh of the level that has a lightmap, in world space, with its final lightmap UVs.
 struct Mesh {
     std::string node;  // the glTF node's name
     uint32_t page = 0;
@@ -85,6 +86,11 @@ class Pack {
     std::span<const Contribution> contributions() const;
     std::span<const Mesh> meshes() const;
     std::span<const Viewpoint> viewpoints() const;
+    // What light grids light: models that stand, models that move, and empty places for such.
+    std::span<const PlacedModel> models() const;
+    std::span<const ModelMesh> modelMeshes() const;
+    // Where the probes of PlacedModel::local_grid are, for the same shading as that of models that move.
+    ModelSlot localGridSlot(uint32_t local_grid) const;
     uint32_t pageCount() const;
     uint32_t pageWidth() const;
     uint32_t pageHeight() const;

@@ -2,7 +2,7 @@
 // the light?"), and for servers without a GPU.
 #pragma once
 
-#include <dimmer/models.h>
+#include <dimmer/model_mesh.h>
 #include <dimmer/pack.h>
 
 #include <array>
@@ -19,6 +19,9 @@ struct Radiance {
 
 // Irradiance in lux on a surface with this unit normal; never negative.
 std::array<float, 3> irradiance(const Radiance& radiance, std::array<float, 3> normal);
+
+// The same on a surface that knows what of its surroundings it sees.
+std::array<float, 3> transferredIrradiance(const Radiance& radiance, const LightTransfer& transfer);
 
 // Where the last query ended; pass it to the next one nearby and it finds its place in a step or two. One per thread.
 struct GridHint {
@@ -39,10 +42,13 @@ class GridSampler {
     std::array<float, 3> sample(std::array<float, 3> point_m, std::array<float, 3> normal,
                                 GridHint* hint = nullptr) const;
 
-    // The same at a place of a model, from the model's own probes, linear between them. The CPU twin of
-    // dimmer_model_irradiance in grid.glsl.
+    // The same at a place of a model, from the model's own probes, linear between them. Of models that move and
+    // of those that stand (Pack::localGridSlot). The CPU twin of dimmer_model_irradiance in grid.glsl.
     Radiance radiance(const ModelSlot& slot, std::array<float, 3> point_m) const;
     std::array<float, 3> sample(const ModelSlot& slot, std::array<float, 3> point_m, std::array<float, 3> normal) const;
+    // With the model's shadow on itself: modelTransfer() of a vertex, or the mean of several.
+    std::array<float, 3> sampleTransfer(const ModelSlot& slot, std::array<float, 3> point_m,
+                                        const LightTransfer& transfer) const;
 
    private:
     Pack pack_;

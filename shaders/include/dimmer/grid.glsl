@@ -190,6 +190,46 @@ vec3 dimmer_radiance_irradiance(DimmerRadiance radiance, vec3 normal) {
     return max(dimmer_radiance_sum(radiance, normal, vec3(3.14159265, 2.09439510, 0.785398163)), vec3(0));
 }
 
+// The cosine-weighted visibility of a surface: irradiance is the sum of products with the radiance's coefficients. See
+// LightTransfer in <dimmer/model_mesh.h>.
+struct DimmerTransfer {
+    vec3 coefficients[3];  // nine, in order
+};
+
+// Irradiance in lux on a surface that knows what of its surroundings it sees.
+vec3 dimmer_transferred_irradiance(DimmerRadiance radiance, DimmerTransfer transfer) {
+    vec3 sum = vec3(0);
+    for (int i = 0; i < 9; ++i) sum += transfer.coefficients[i / 3][i % 3] * radiance.coefficients[i];
+    return max(sum, vec3(0));
+}
+
+// A unit vector from two SNORMs (octahedral).
+vec3 dimmer_model_normal(vec2 octahedral) {
+    vec3 n = vec3(octahedral, 1.0 - abs(octahedral.x) - abs(octahedral.y));
+    float fold = max(-n.z, 0.0);
+    n.x += n.x >= 0.0 ? -fold : fold;
+    n.y += n.y >= 0.0 ? -fold : fold;
+    return normalize(n);
+}
+
+// Of a vertex of ModelMesh, whose nine SNORMs these are, in the world's axes.
+//   world_from_model   rotation; where the model is scaled, its columns divided by their lengths
+DimmerTransfer dimmer_transfer(vec4 first, vec4 second, float last, mat3 world_from_model) {
+    const vec3 bounds = vec3(0.886226925, 1.02332671, 0.661);  // transfer_bounds
+    vec3 lobe = world_from_model * (bounds.y * vec3(first.w, first.y, first.z));
+    // Band 2 as w.M w; the factors of its harmonics are 1.092548431 (products), 0.315391565, 0.546274215.
+    vec4 products = 0.546274215 * bounds.z * vec4(second.x, second.y, second.w, last);  // xy, yz, xz; x2 - y2
+    float polar = 0.315391565 * bounds.z * second.z;
+    mat3 m = mat3(products.w - polar, products.x, products.z,
+                  products.x, -products.w - polar, products.y,
+                  products.z, products.y, 2.0 * polar);
+    m = world_from_model * m * transpose(world_from_model);
+    const float inverse = 1.0 / 0.546274215;
+    return DimmerTransfer(vec3[3](vec3(bounds.x * first.x, lobe.y, lobe.z),
+                                  vec3(lobe.x, inverse * m[1][0], inverse * m[2][1]),
+                                  vec3(m[2][2] / 0.63078313, inverse * m[2][0], 0.5 * inverse * (m[0][0] - m[1][1]))));
+}
+
 // ModelSlot of <dimmer/models.h>, as std140 and std430 lay it out alike.
 struct DimmerModelSlot {
     uvec4 first_probe_counts;  // first_probe, counts.xyz
@@ -223,6 +263,12 @@ DimmerRadiance dimmer_model_radiance(DimmerModelSlot slot, vec3 position, float 
 //   exposure, format   Pack::exposure(), Pack::colorFormat(): best a constant or a specialisation constant
 vec3 dimmer_model_irradiance(DimmerModelSlot slot, vec3 position, vec3 normal, float exposure, uint format) {
     return dimmer_radiance_irradiance(dimmer_model_radiance(slot, position, exposure, format), normal);
+}
+
+// The same with the model's shadow on itself; `transfer` of its vertices, interpolated.
+vec3 dimmer_model_irradiance_shadowed(DimmerModelSlot slot, vec3 position, DimmerTransfer transfer, float exposure,
+                                      uint format) {
+    return dimmer_transferred_irradiance(dimmer_model_radiance(slot, position, exposure, format), transfer);
 }
 
 #ifdef DIMMER_GRID_WORDS

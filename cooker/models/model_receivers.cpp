@@ -1,0 +1,207 @@
+#include <models/model_receivers.h>
+
+#include <bake/sampling.h>
+#include <models/scene_models.h>
+#include <probes/free_space.h>
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dimmer::cook {
+namespace {
+
+// Probes stand on the floor that a model stands on: shares of the way to the model's middle that are tried.
+constexpr std::array<float, 7> ways_in = {0.03f, 0.06f, 0.1f, 0.18f, 0.3f, 0.45f, 0.6f};
+constexpr float clearance_m = 0.02f;
+constexpr uint32_t points_per_triangle = 16;
+
+struct NearNormals {
+    std::array<uint32_t, 3> index;
+    std::array<float, 3> share;
+};
+
+// The corners of an octahedron (+x -x +y -y +z -z), then the middles of its edges.
+uint32_t cornerIndex(int axis, bool negative) {
+    return static_cast<uint32_t>(2 * axis) + negative;
+}
+// Of the edge between two axes, the one that `third` is not; by the signs of the two.
+uint32_t edgeIndex(int third, bool negative_a, bool negative_b) {
+    return 6 + static_cast<uint32_t>(4 * third) + 2 * negative_a + negative_b;
+}
+
+glm::vec3 normalAt(uint32_t index) {
+    glm::vec3 n(0);
+    if (index < 6) {
+        n[static_cast<int>(index / 2)] = index % 2 ? -1.0f : 1.0f;
+        return n;
+    }
+    const auto third = static_cast<int>((index - 6) / 4);
+    const int a = (third + 1) % 3, b = (third + 2) % 3;
+    n[a] = (index - 6) / 2 % 2 ? -1.0f : 1.0f;
+    n[b] = (index - 6) % 2 ? -1.0f : 1.0f;
+    return n * std::sqrt(0.5f);
+}
+
+// Linear over the octahedron's faces, each cut in four.
+NearNormals nearNormals(glm::vec3 n) {
+    const glm::vec3 size = glm::abs(n), share = size / (size.x + size.y + size.z);
+    const auto edge = [&](int third) { return edgeIndex(third, n[(third + 1) % 3] < 0, n[(third + 2) % 3] < 0); };
+    for (int axis = 0; axis < 3; ++axis) {
+        if (!(share[axis] > 0.5f)) continue;
+        const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+        return {{cornerIndex(axis, n[axis] < 0), edge(c), edge(b)}, {2 * share[axis] - 1, 2 * share[b], 2 * share[c]}};
+    }
+    return {{edge(0), edge(1), edge(2)}, {1 - 2 * share[0], 1 - 2 * share[1], 1 - 2 * share[2]}};
+}
+
+struct NearProbes {
+    std::array<uint32_t, 8> number;  // within the model
+    std::array<float, 8> share;
+};
+
+NearProbes nearProbes(const SceneModel& model, glm::vec3 point_m) {
+    const glm::vec3 inside = glm::transpose(model.world_from_model) * (point_m - model.origin_m) - model.min_m;
+    const glm::vec3 last = glm::vec3(model.probes - 1u);
+    const glm::vec3 at = glm::clamp(inside / (model.max_m - model.min_m) * last, glm::vec3(0), last);
+    const glm::uvec3 low = glm::min(glm::uvec3(at), model.probes - 2u);
+    const glm::vec3 along = at - glm::vec3(low);
+    NearProbes near;
+    for (uint32_t corner = 0; corner < 8; ++corner) {
+        const glm::uvec3 step(corner & 1, corner >> 1 & 1, corner >> 2), cell = low + step;
+        near.number[corner] = cell.x + model.probes.x * (cell.y + model.probes.y * cell.z);
+        near.share[corner] = 1;
+        for (int i = 0; i < 3; ++i) near.share[corner] *= step[i] ? along[i] : 1 - along[i];
+    }
+    return near;
+}
+
+template <size_t count>
+uint32_t drawn(const std::array<uint32_t, count>& from, const std::array<float, count>& shares, float chance) {
+    for (size_t i = 0; i + 1 < count; ++i)
+        if ((chance -= shares[i]) < 0) return from[i];
+    return from[count - 1];
+}
+
+// visit(point, normal, area, reflectance) for points spread over a model's lit sides.
+void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
+    const Scene& scene = rays.scene();
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+        const LevelTriangle& triangle = rays.triangles()[t];
+        if (scene.meshes[triangle.mesh].model != model) continue;
+        const Material& material = scene.materials[triangle.material];
+        const glm::vec3 a = rays.corner(t, 0);
+        const float area = 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
+        for (uint32_t i = 0; i < points_per_triangle; ++i) {
+            const glm::vec2 square = sequence2d(i, t);
+            const float root = std::sqrt(square.x), u = root * (1 - square.y), v = root * square.y;
+            const glm::vec3 rho = material.reflectance(glm::vec3(rays.surfaceColor(t, u, v)));
+            visit(rays.pointOn(t, u, v), triangle.normal, area / points_per_triangle, rho);
+            if (material.double_sided) visit(rays.pointOn(t, u, v), -triangle.normal, area / points_per_triangle, rho);
+        }
+    }
+}
+
+}  // namespace
+
+TangentFrame receiverFrame(uint32_t face) {
+    TangentFrame frame;
+    frame.normal = normalAt(face - first_receiver_face);
+    orthonormalBasis(frame.normal, frame.tangent, frame.bitangent);
+    return frame;
+}
+
+ModelReceivers::ModelReceivers(const RayScene& rays) : rays_(rays) {
+    const auto& models = rays.scene().models;
+    if (std::ranges::none_of(models, [](const SceneModel& m) { return !m.moves; })) return;
+    models_.resize(models.size());
+    for (uint32_t m = 0; m < models.size(); ++m) {
+        if (models[m].moves) continue;
+        placeProbes(m);
+        makeReceivers(m);
+    }
+}
+
+void ModelReceivers::placeProbes(uint32_t index) {
+    const SceneModel& model = rays_.scene().models[index];
+    const uint32_t first = models_[index].first_probe = static_cast<uint32_t>(places_.position_m.size());
+    const uint32_t count = model.probes.x * model.probes.y * model.probes.z;
+    const glm::vec3 middle = model.world(0.5f * (model.min_m + model.max_m));
+    std::vector<uint8_t> open(count);
+    places_.position_m.resize(first + count);
+    places_.source.resize(first + count);
+    model_of_probe_.resize(first + count, index);
+    tbb::parallel_for(0u, count, [&](uint32_t i) {
+        const glm::vec3 corner = probePosition(model, i);
+        places_.position_m[first + i] = corner;
+        for (const float way : ways_in) {
+            const glm::vec3 p = glm::mix(corner, middle, way);
+            open[i] = inTheOpen(rays_, p, index, clearance_m);
+            if (!open[i]) continue;
+            places_.position_m[first + i] = p;
+            return;
+        }
+    });
+    for (uint32_t i = 0; i < count; ++i) {
+        places_.source[first + i] = no_index;
+        float nearest = std::numeric_limits<float>::infinity();
+        for (uint32_t k = 0; k < count; ++k) {
+            const float distance = glm::distance(probePosition(model, i), probePosition(model, k));
+            if (open[k] && distance < nearest) nearest = distance, places_.source[first + i] = first + k;
+        }
+    }
+}
+
+// A receiver for each probe that is in the open and each normal that is near to one of the surface's.
+void ModelReceivers::makeReceivers(uint32_t index) {
+    Model& model = models_[index];
+    const SceneModel& scene_model = rays_.scene().models[index];
+    model.slots.fill(no_index);
+    glm::vec3 reflected(0);
+    float area_m2 = 0;
+    forSurface(rays_, index, [&](glm::vec3, glm::vec3 normal, float area, glm::vec3 rho) {
+        const NearNormals near = nearNormals(normal);
+        for (size_t i = 0; i < 3; ++i)
+            if (near.share[i] > 0 && model.slots[near.index[i]] == no_index)
+                model.slots[near.index[i]] = model.slot_count++;
+        reflected += area * rho;
+        area_m2 += area;
+    });
+    if (area_m2 > 0) model.reflectance = reflected / area_m2;
+    model.first_receiver = static_cast<uint32_t>(points_.size());
+    const uint32_t probes = scene_model.probes.x * scene_model.probes.y * scene_model.probes.z;
+    for (uint32_t p = 0; p < probes; ++p)
+        for (uint32_t s = 0; s < model.slot_count; ++s) {
+            const auto normal = static_cast<uint32_t>(std::ranges::find(model.slots, s) - model.slots.begin());
+            points_.push_back({places_.position_m[model.first_probe + p], first_receiver_face + normal});
+            model_.push_back(index);
+            area_m2_.push_back(0);
+        }
+    forSurface(rays_, index, [&](glm::vec3 point, glm::vec3 normal, float area, glm::vec3) {
+        const NearNormals normals = nearNormals(normal);
+        const NearProbes near = nearProbes(scene_model, point);
+        for (size_t n = 0; n < 3; ++n)
+            for (size_t k = 0; k < 8; ++k) {
+                const uint32_t source = places_.source[model.first_probe + near.number[k]];
+                const uint32_t slot = model.slots[normals.index[n]];
+                if (source == no_index || slot == no_index) continue;
+                area_m2_[model.first_receiver + (source - model.first_probe) * model.slot_count + slot] +=
+                    area * normals.share[n] * near.share[k];
+            }
+    });
+}
+
+uint32_t ModelReceivers::pick(uint32_t index, glm::vec3 point_m, glm::vec3 normal, uint32_t chance) const {
+    const Model& model = models_[index];
+    const NearNormals normals = nearNormals(normal);
+    const NearProbes near = nearProbes(rays_.scene().models[index], point_m);
+    const uint32_t probe = drawn(near.number, near.share, unitFloat(hash(chance, 1)));
+    const uint32_t source = places_.source[model.first_probe + probe];
+    const uint32_t slot = model.slots[drawn(normals.index, normals.share, unitFloat(hash(chance, 2)))];
+    if (source == no_index || slot == no_index) return no_index;
+    return model.first_receiver + (source - model.first_probe) * model.slot_count + slot;
+}
+
+}  // namespace dimmer::cook

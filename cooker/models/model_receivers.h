@@ -1,0 +1,71 @@
+// Models with light grids as the bounces see them: a few surfaces at each probe, one for each of 18 normals spread over
+// the sphere. Their light is gathered as that of texels is, without the model itself; a ray that hits the model picks
+// one of them.
+#pragma once
+
+#include <charts/texels.h>
+
+#include <array>
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+inline constexpr size_t receiver_normals = 18;
+
+// Where the light of a model's probes is gathered.
+struct ProbePlaces {
+    // Per probe: a little nearer to the middle of the model than it stands, as far as it takes to be in the open.
+    std::vector<glm::vec3> position_m;
+    // Per probe, the one whose light it has: its own or, inside of other geometry, the nearest that is in the open;
+    // no_index where none of the model's is.
+    std::vector<uint32_t> source;
+};
+
+class ModelReceivers {
+   public:
+    // Of the models of the rays' scene (listModels); empty where none stands.
+    explicit ModelReceivers(const RayScene& rays);
+
+    bool empty() const { return models_.empty(); }
+    size_t size() const { return points_.size(); }
+    // Its face is one for receiverFrame().
+    const SamplePoint& point(size_t i) const { return points_[i]; }
+    uint32_t model(size_t i) const { return model_[i]; }
+    float areaM2(size_t i) const { return area_m2_[i]; }
+    glm::vec3 reflectance(size_t i) const { return models_[model_[i]].reflectance; }
+
+    // What a ray reads that hits a model at a point of its surface with this normal; no_index where nothing is known.
+    // Which one is drawn by `chance`: on average, linear between the probes and between the normals.
+    uint32_t pick(uint32_t model, glm::vec3 point_m, glm::vec3 normal, uint32_t chance) const;
+
+    // Over all models' probes, in the order of localGrids().
+    const ProbePlaces& places() const { return places_; }
+    uint32_t modelOfProbe(uint32_t probe) const { return model_of_probe_[probe]; }
+
+   private:
+    struct Model {
+        uint32_t first_probe = 0, first_receiver = 0;
+        std::array<uint32_t, receiver_normals> slots{};  // of the normals that the model's surface is near to
+        uint32_t slot_count = 0;
+        glm::vec3 reflectance{0};
+    };
+    void placeProbes(uint32_t model);
+    void makeReceivers(uint32_t model);
+
+    const RayScene& rays_;
+    std::vector<Model> models_;  // as in Scene::models; those that move are left empty
+    std::vector<SamplePoint> points_;
+    std::vector<uint32_t> model_;
+    std::vector<float> area_m2_;
+    ProbePlaces places_;
+    std::vector<uint32_t> model_of_probe_;
+};
+
+// Faces from here on are not of the charts: the normals of receivers, and no_face.
+inline constexpr uint32_t first_receiver_face = 0xffffff00u;
+TangentFrame receiverFrame(uint32_t face);
+
+}  // namespace dimmer::cook

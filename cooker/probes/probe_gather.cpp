@@ -1,0 +1,68 @@
+#include <probes/probe_gather.h>
+
+#include <bake/direct.h>
+#include <bake/sampling.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+namespace {
+
+// Rays go all around, and there are few probes: more of them than a texel gets.
+constexpr uint32_t rays_per_texel_ray = 4;
+
+}  // namespace
+
+ProbeGather::ProbeGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                         const BakeSettings& settings)
+    : gatherer_(gatherer),
+      lights_(lights),
+      series_(series),
+      settings_(settings),
+      floors_(noiseFloors(series)),
+      options_(finalGatherOptions(settings, floors_)),
+      final_(gatherer_),
+      sum_(gatherer_.paths().termCount()),
+      direct_(gatherer_.paths().termCount()),
+      stored_(gatherer_.paths().termCount()) {
+    options_.rays_max *= rays_per_texel_ray;
+}
+
+uint64_t ProbeGather::gather(glm::vec3 position_m, uint32_t id, std::span<const uint8_t> groups, uint32_t ignored,
+                             std::vector<ProbeTermLight>& row) {
+    const SamplePoint point{position_m, no_face};
+    const GatherFrom from = Gatherer::atProbe(point, id, ignored);
+    const uint64_t shadow_rays = findActive(from, groups);
+    row.clear();
+    const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row);
+    for (ProbeTermLight& l : row)
+        if (const auto touched = stored_.touched(); std::ranges::binary_search(touched, l.term))
+            l.light += stored_[l.term];
+    stored_.clear();
+    return shadow_rays + traced + settings_.series_rays;
+}
+
+// As for texels: lit straight, or by as much as the term's threshold asks.
+uint64_t ProbeGather::findActive(const GatherFrom& from, std::span<const uint8_t> groups) {
+    const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, stored_);
+    gatherer_.gather(from,
+                     {.rays = settings_.series_rays,
+                      .emitter_samples = settings_.emitter_samples,
+                      .seed = settings_.seed,
+                      .wanted_in_group = {}},
+                     &series_.radiance, sum_, nullptr);
+    active_.assign(1, always_group);
+    for (auto* light : {&direct_, &sum_}) {
+        for (const uint32_t t : light->touched()) {
+            const float lux = luminance((*light)[t].irradiance());
+            if (t != always_group && series_.active(t, 0, lux)) active_.push_back(t);
+        }
+        light->clear();
+    }
+    std::ranges::sort(active_);
+    active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
+    std::erase_if(active_, [&](uint32_t t) { return !groups[gatherer_.paths().terms()[t].group]; });
+    return shadow_rays;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,40 @@
+// The light of one probe: which terms are active there, and their radiance.
+#pragma once
+
+#include <bake/final_gather.h>
+#include <bake/light_grid.h>
+#include <bake/series.h>
+
+#include <cstdint>
+#include <glm/glm.hpp>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+// One worker's scratch; not thread-safe, make one per thread.
+class ProbeGather {
+   public:
+    ProbeGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series, const BakeSettings& settings);
+
+    // Replaces `row`. `id` seeds the probe's rays; `groups`: per light group, whether it is asked for; `ignored`: the
+    // model that the probe lights. Returns the rays traced.
+    uint64_t gather(glm::vec3 position_m, uint32_t id, std::span<const uint8_t> groups, uint32_t ignored,
+                    std::vector<ProbeTermLight>& row);
+
+   private:
+    // Returns the shadow rays traced.
+    uint64_t findActive(const GatherFrom& from, std::span<const uint8_t> groups);
+
+    const Gatherer& gatherer_;
+    const LightGrid& lights_;
+    const Series& series_;
+    const BakeSettings& settings_;
+    std::vector<float> floors_;
+    FinalGatherOptions options_;
+    FinalGather<ProbeLight> final_;
+    TermAccumulator<ProbeLight> sum_, direct_, stored_;
+    std::vector<uint32_t> active_;
+};
+
+}  // namespace dimmer::cook
