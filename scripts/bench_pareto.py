@@ -159,24 +159,25 @@ def with_bake(level, figures):
 
 
 def measure_grids(level):
-    """Error at free points against the number of probes, from the desktop's default."""
+    """Error at free points against the number of probes, from the desktop's default; and for a uniform grid of as many."""
     if level.name == "house":
         return
     states = list(json.loads((TRUTH / f"{level.name}.json").read_text())["states"].items())[:5]
     points = TRUTH / f"{level.name}.free.points.csv"
     truth = {text: (points, read_truth(TRUTH / f"{level.name}.free.{state}.csv")) for state, text in states}
-    for probes in GRID_AXIS:
-        key = f"grid probes_max={probes}"
+    for probes, uniform in itertools.product(GRID_AXIS, (False, True)):
+        key = f"grid probes_max={probes}" + " uniform" * uniform
         if key in level.results:
             continue
         pack = level.folder / "grid.dimmer"
         before = cpu_seconds()
         dimmer("cook", level.path, "-o", pack, "--quality", level.quality, "--set", f"grids.probes_max={probes}",
-               "--set", "grids.global=on", "--cache", level.cache)
+               "--set", "grids.global=on", *(["--grid-baseline", "uniform", "--no-cache"] if uniform
+                                             else ["--cache", level.cache]))
         seconds = cpu_seconds() - before
         mean, p95 = errors(pack, truth, "grid")
         size = json.loads(dimmer("inspect", pack, "--json", "-"))
-        level.keep(key, {"grid": probes, "probes": size["receivers"]["global_probes"], "mean": mean, "p95": p95,
+        level.keep(key, {"grid": probes, "uniform": uniform, "probes": size["receivers"]["global_probes"], "mean": mean, "p95": p95,
                          "bytes": size["bytes"].get("global_grid", 0), "cook_s": seconds})
         print(f"  {level.name}: {key}: mean {100 * mean:.1f} %", flush=True)
 
@@ -218,6 +219,16 @@ def front_table(levels):
                   "default of"], rows)
 
 
+def grid_table(levels):
+    rows = []
+    for level in levels:
+        grids = [f for f in level.results.values() if "grid" in f]
+        for g in sorted(grids, key=lambda g: (g["uniform"], g["probes"])):
+            rows.append([level.name, "uniform" if g["uniform"] else "adaptive", str(g["probes"]),
+                         f"{100 * g['mean']:.1f}", f"{100 * g['p95']:.0f}", f"{g['bytes'] / 1e3:.0f}"])
+    return table(["light grid", "places", "probes", "mean %", "p95 %", "kB"], rows)
+
+
 def main():
     parser = argparse.ArgumentParser(prog="scripts/bench pareto", description=__doc__.splitlines()[0])
     parser.add_argument("--levels", nargs="*", default=["two_rooms", "house", "lq_old_start", "lq_e2m2", "lq_e2m3"])
@@ -242,7 +253,7 @@ def main():
                            {name: key_of(c) for name, c in profiles().items()}))
     counts = ", ".join(f"{level.name} {len(lightmap_results(level))}" for level in levels)
     refresh("pareto", f"`scripts/bench pareto --quality {options.quality}`; configurations measured, of "
-            f"{len(configurations())} each: {counts}\n\n" + front_table(levels))
+            f"{len(configurations())} each: {counts}\n\n" + front_table(levels) + "\n\n" + grid_table(levels))
     print(f"Report: {page}")
 
 

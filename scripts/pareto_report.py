@@ -48,51 +48,70 @@ def ticks(low, high):
     return found
 
 
+class LogPlot:
+    """Both axes logarithmic, 7 to 10 % of room around what is there."""
+
+    def __init__(self, xs, ys, label, about):
+        self.x0, self.x1 = min(xs) * 0.9, max(xs) * 1.1
+        self.y0, self.y1 = min(ys) * 0.93, max(ys) * 1.07
+        out = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{about}">']
+        for t in ticks(self.x0, self.x1):
+            out.append(f'<line class="line" x1="{self.x(t):.1f}" x2="{self.x(t):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
+                       f'<text x="{self.x(t):.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">{t:g}</text>')
+        for t in ticks(self.y0, self.y1):
+            out.append(f'<line class="line" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{self.y(t):.1f}" y2="{self.y(t):.1f}"/>'
+                       f'<text x="{LEFT - 6}" y="{self.y(t) + 4:.1f}" text-anchor="end">{t:g}</text>')
+        out.append(f'<text x="{(LEFT + WIDTH) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{label}</text>'
+                   f'<text transform="translate(14 {HEIGHT / 2}) rotate(-90)" text-anchor="middle">mean error, %</text>')
+        self.parts = out
+
+    def x(self, v):
+        return LEFT + (WIDTH - LEFT - RIGHT) * math.log(max(v, self.x0) / self.x0) / math.log(self.x1 / self.x0)
+
+    def y(self, v):
+        return HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * math.log(v / self.y0) / math.log(self.y1 / self.y0)
+
+    def dot(self, x, y, colour, title):
+        self.parts.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="4" fill="{colour}">'
+                          f"<title>{html.escape(title)}</title></circle>")
+
+    def line(self, points, style):
+        places = " ".join(f"{self.x(x):.1f},{self.y(y):.1f}" for x, y in points)
+        self.parts.append(f'<polyline {style} points="{places}"/>')
+
+    def name(self, x, y, text):
+        cx, cy = self.x(x), self.y(y)
+        right = cx > WIDTH * 0.6
+        self.parts.append(f'<text x="{cx + (-10 if right else 10):.1f}" y="{cy - 8:.1f}" '
+                          f'text-anchor="{"end" if right else "start"}">{html.escape(text)}</text>')
+
+    def finish(self):
+        return "\n".join(self.parts + ["</svg>"])
+
+
 def scatter(figures, cost, label, defaults):
-    scale = 1e-6 if cost == "bytes" else 1
-    xs = [max(f[cost] * scale, 1e-6) for f in figures.values()]
-    ys = [100 * f["mean"] for f in figures.values()]
-    x0, x1 = min(xs) * 0.9, max(xs) * 1.1
-    y0, y1 = min(ys) * 0.93, max(ys) * 1.07
+    def at(f):
+        return f[cost] * (1e-6 if cost == "bytes" else 1), 100 * f["mean"]
 
-    def x(v):
-        return LEFT + (WIDTH - LEFT - RIGHT) * math.log(max(v, 1e-6) / x0) / math.log(x1 / x0)
-
-    def y(v):
-        return HEIGHT - BOTTOM - (HEIGHT - BOTTOM - TOP) * math.log(v / y0) / math.log(y1 / y0)
-
-    out = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="mean error against {label}">']
-    for t in ticks(x0, x1):
-        out.append(f'<line class="line" x1="{x(t):.1f}" x2="{x(t):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
-                   f'<text x="{x(t):.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">{t:g}</text>')
-    for t in ticks(y0, y1):
-        out.append(f'<line class="line" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(t):.1f}" y2="{y(t):.1f}"/>'
-                   f'<text x="{LEFT - 6}" y="{y(t) + 4:.1f}" text-anchor="end">{t:g}</text>')
-    out.append(f'<text x="{(LEFT + WIDTH) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{label}</text>'
-               f'<text transform="translate(14 {HEIGHT / 2}) rotate(-90)" text-anchor="middle">mean error, %</text>')
-    for key, f in figures.items():
-        colour = DENSITY_COLOURS.get(f["settings"]["lightmaps.texels_per_metre"], "#777")
+    places = [at(f) for f in figures.values()]
+    plot = LogPlot([max(x, 1e-6) for x, _ in places], [y for _, y in places], label, f"mean error against {label}")
+    for f in figures.values():
         lines = [f"{k.split('.')[1]} {v}" for k, v in f["settings"].items()]
         lines += [f"mean {100 * f['mean']:.2f} %, 95th percentile {100 * f['p95']:.1f} %",
                   f"{f['update_us']:.0f} us ({f['roof']:.2f} of the roof), {f['bytes'] / 1e6:.2f} MB, "
                   f"{f['bake_s']:.1f} CPU s"]
-        out.append(f'<circle cx="{x(f[cost] * scale):.1f}" cy="{y(100 * f["mean"]):.1f}" r="4" fill="{colour}">'
-                   f"<title>{html.escape(chr(10).join(lines))}</title></circle>")
+        plot.dot(*at(f), DENSITY_COLOURS.get(f["settings"]["lightmaps.texels_per_metre"], "#777"), "\n".join(lines))
     if cost != "bake_s":
-        points = " ".join(f"{x(figures[k][cost] * scale):.1f},{y(100 * figures[k]['mean']):.1f}"
-                          for k in front(figures, cost))
-        out.append(f'<polyline class="front" points="{points}"/>')
-    places = {}
+        plot.line([at(figures[k]) for k in front(figures, cost)], 'class="front"')
+    of_key = {}
     for name, key in defaults.items():
         if key in figures:
-            places.setdefault(key, []).append(name)
-    for key, names in places.items():
-        cx, cy = x(figures[key][cost] * scale), y(100 * figures[key]["mean"])
-        anchor = "end" if cx > WIDTH * 0.6 else "start"
-        offset = -10 if anchor == "end" else 10
-        out.append(f'<circle class="default" cx="{cx:.1f}" cy="{cy:.1f}" r="7"/>'
-                   f'<text x="{cx + offset:.1f}" y="{cy - 8:.1f}" text-anchor="{anchor}">{", ".join(names)}</text>')
-    return "\n".join(out + ["</svg>"])
+            of_key.setdefault(key, []).append(name)
+    for key, names in of_key.items():
+        x, y = at(figures[key])
+        plot.parts.append(f'<circle class="default" cx="{plot.x(x):.1f}" cy="{plot.y(y):.1f}" r="7"/>')
+        plot.name(x, y, ", ".join(names))
+    return plot.finish()
 
 
 def defaults_table(figures, defaults):
@@ -105,13 +124,25 @@ def defaults_table(figures, defaults):
     return f"<div class=scroll><table>{''.join(rows)}</table></div>"
 
 
+def grid_plot(grids):
+    plot = LogPlot([g["probes"] for g in grids], [100 * g["mean"] for g in grids], "probes", "error against probes")
+    for uniform, name, colour in ((False, "adaptive", "#3b7dd8"), (True, "uniform", "#c9b458")):
+        line = sorted((g["probes"], 100 * g["mean"]) for g in grids if g["uniform"] == uniform)
+        plot.line(line, f'fill="none" stroke="{colour}" stroke-width="2"')
+        for probes, error in line:
+            plot.dot(probes, error, colour, f"{name}, {probes} probes: {error:.1f} %")
+        if line:
+            plot.name(*line[0], name)
+    return f"<div class=plots>{plot.finish()}</div>"
+
+
 def grid_table(grids):
     if not grids:
         return ""
-    rows = ["<tr><th>probes<th>mean %<th>95th percentile %<th>kB<th>cook, CPU s</tr>"]
-    rows += [f"<tr><td>{g['probes']}<td>{100 * g['mean']:.1f}<td>{100 * g['p95']:.0f}<td>{g['bytes'] / 1e3:.0f}"
-             f"<td>{g['cook_s']:.1f}</tr>" for g in sorted(grids, key=lambda g: g["probes"])]
-    return f"<h3>Light grid, at free points</h3><div class=scroll><table>{''.join(rows)}</table></div>"
+    rows = ["<tr><th>places<th>probes<th>mean %<th>95th percentile %<th>kB<th>cook, CPU s</tr>"]
+    rows += [f"<tr><td>{'uniform' if g['uniform'] else 'adaptive'}<td>{g['probes']}<td>{100 * g['mean']:.1f}<td>{100 * g['p95']:.0f}<td>{g['bytes'] / 1e3:.0f}"
+             f"<td>{g['cook_s']:.1f}</tr>" for g in sorted(grids, key=lambda g: (g["uniform"], g["probes"]))]
+    return f"<h3>Light grid, at free points</h3>{grid_plot(grids)}<div class=scroll><table>{''.join(rows)}</table></div>"
 
 
 def report(levels, defaults):
