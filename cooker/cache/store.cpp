@@ -49,7 +49,7 @@ std::optional<std::vector<std::byte>> decode(std::span<const std::byte> file) {
     if (header.magic != entry_magic || stored.size() != header.stored_bytes) return {};
     const XXH128_hash_t hash = XXH3_128bits(stored.data(), stored.size());
     if (hash.high64 != header.hash_high || hash.low64 != header.hash_low) return {};
-    return decompress(stored, header.real_bytes);
+    return Decompressor().run(stored, header.real_bytes);
 }
 
 std::vector<std::byte> encode(std::span<const std::byte> bytes) {

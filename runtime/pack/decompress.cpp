@@ -14,11 +14,20 @@ constexpr uint64_t first_step_bytes = 1 << 16;
 
 }  // namespace
 
-std::optional<std::vector<std::byte>> decompress(std::span<const std::byte> stored, uint64_t real_bytes) {
+struct Decompressor::State {
+    std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context{ZSTD_createDCtx(), &ZSTD_freeDCtx};
+};
+
+Decompressor::Decompressor() : state_(std::make_unique<State>()) {
+    if (!state_->context) throw std::bad_alloc();
+    ZSTD_DCtx_setParameter(state_->context.get(), ZSTD_d_windowLogMax, window_log_max);
+}
+Decompressor::~Decompressor() = default;
+
+std::optional<std::vector<std::byte>> Decompressor::run(std::span<const std::byte> stored, uint64_t real_bytes) {
     if (ZSTD_getFrameContentSize(stored.data(), stored.size()) != real_bytes) return std::nullopt;
-    const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(), &ZSTD_freeDCtx);
-    if (!context) throw std::bad_alloc();
-    ZSTD_DCtx_setParameter(context.get(), ZSTD_d_windowLogMax, window_log_max);
+    // What a damaged frame left behind.
+    ZSTD_DCtx_reset(state_->context.get(), ZSTD_reset_session_only);
 
     std::vector<std::byte> out;
     ZSTD_inBuffer in{stored.data(), stored.size(), 0};
@@ -28,7 +37,7 @@ std::optional<std::vector<std::byte>> decompress(std::span<const std::byte> stor
             out.resize(std::min(real_bytes, std::max<uint64_t>({first_step_bytes, 2 * done, 4 * stored.size()})));
         ZSTD_outBuffer free{out.data() + done, out.size() - done, 0};
         const size_t read_before = in.pos;
-        hint = ZSTD_decompressStream(context.get(), &free, &in);
+        hint = ZSTD_decompressStream(state_->context.get(), &free, &in);
         if (ZSTD_isError(hint)) return std::nullopt;
         if (free.pos == 0 && in.pos == read_before && hint != 0) return std::nullopt;  // cut short
         done += free.pos;

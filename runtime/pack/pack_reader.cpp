@@ -164,7 +164,7 @@ class Reader {
         by_name_.erase(found);
         const auto stored = file_.subspan(c.offset, c.stored_bytes);
         if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
-        auto shuffled = decompress(stored, c.real_bytes);
+        auto shuffled = decompressor_.run(stored, c.real_bytes);
         if (!shuffled) return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
         return unshuffle(std::move(*shuffled), c.shuffle);
     }
@@ -179,8 +179,13 @@ class Reader {
         if (record <= 1 || bytes.empty() || bytes.size() % record != 0) return bytes;
         const size_t count = bytes.size() / record;
         std::vector<std::byte> out(bytes.size());
-        for (size_t b = 0; b < record; ++b)
-            for (size_t i = 0; i < count; ++i) out[i * record + b] = bytes[b * count + i];
+        // Some kilobytes at a time, so that each is written to memory once.
+        constexpr size_t block = 512;
+        for (size_t begin = 0; begin < count; begin += block) {
+            const size_t end = std::min(begin + block, count);
+            for (size_t b = 0; b < record; ++b)
+                for (size_t i = begin; i < end; ++i) out[i * record + b] = bytes[b * count + i];
+        }
         return out;
     }
 
@@ -356,6 +361,7 @@ class Reader {
     format::Header header_{};
     std::vector<Chunk> chunks_;
     std::map<std::pair<uint32_t, uint32_t>, const Chunk*> by_name_;  // type and subject; those not yet loaded
+    Decompressor decompressor_;
 };
 
 }  // namespace
