@@ -27,7 +27,7 @@ AXES = {
     "records.overlap_max": [4, 8, 16, 0],
 }
 # The grid's density touches no texel: it is one axis of its own, from the default.
-GRID_AXIS = [100, 300, 1000, 3000]
+GRID_AXIS = [20, 40, 100, 300, 1000, 3000]
 HOUSE_STATES = {"all on": "", "all off": "all=0", "alarm and desk": "all=0,alarm=1/0.2/0.2,desk=0.5",
                 "half, den open": "all=0.5,door:den=1", "front open": "all=0,door:front=1"}
 FLOOR_SHARE = 0.01  # of the mean light with all sets on, as `dimmer verify` has it
@@ -94,9 +94,9 @@ class Level:
             points = TRUTH / f"{self.name}.surface.points.csv"
             return {text: (points, read_truth(TRUTH / f"{self.name}.surface.{state}.csv")) for state, text in states}
         found = {}
-        pack = self.folder / "truth.dimmer"
+        pack = OUT / "house_truth.dimmer"
         for number, text in enumerate(HOUSE_STATES.values()):
-            file = self.folder / f"truth_{number}.csv"
+            file = OUT / f"house_truth_{number}.csv"  # of every quality
             if not file.exists():
                 if not pack.exists():
                     dimmer("cook", self.path, "-o", pack, "--quality", "draft", "--set", "grids.probes_max=0",
@@ -182,6 +182,17 @@ def measure_grids(level):
         print(f"  {level.name}: {key}: mean {100 * mean:.1f} %", flush=True)
 
 
+def measure_causes(level):
+    """What the error at the desktop's default comes from."""
+    if "causes" in level.results:
+        return
+    pack = level.folder / "causes.dimmer"
+    dimmer("cook", level.path, "-o", pack, "--quality", level.quality, "--set", "grids.probes_max=0", "--cache",
+           level.cache)
+    dimmer("verify", level.path, pack, "--no-sets", "--causes", "--points", 200, "--json", level.folder / "causes.json")
+    level.keep("causes", json.loads((level.folder / "causes.json").read_text())["causes"])
+
+
 def measure_level(level, deadline):
     truth = level.truth()
     missing = [c for c in configurations() if key_of(c) not in level.results]
@@ -219,10 +230,15 @@ def front_table(levels):
                   "default of"], rows)
 
 
+def grids_of(level):
+    """Each number of probes once: more than one per cubic metre of air are never placed."""
+    return list({(f["uniform"], f["probes"]): f for f in level.results.values() if "grid" in f}.values())
+
+
 def grid_table(levels):
     rows = []
     for level in levels:
-        grids = [f for f in level.results.values() if "grid" in f]
+        grids = grids_of(level)
         for g in sorted(grids, key=lambda g: (g["uniform"], g["probes"])):
             rows.append([level.name, "uniform" if g["uniform"] else "adaptive", str(g["probes"]),
                          f"{100 * g['mean']:.1f}", f"{100 * g['p95']:.0f}", f"{g['bytes'] / 1e3:.0f}"])
@@ -245,11 +261,12 @@ def main():
         for number, level in enumerate(levels):
             share = (number + 1) / len(levels)
             measure_level(level, begin + 60 * options.minutes * share)
+            measure_causes(level)
             measure_grids(level)
     levels = [level for level in levels if lightmap_results(level)]
     page = OUT / "pareto.html"
     page.write_text(report([(level.name, options.quality, lightmap_results(level),
-                             [f for f in level.results.values() if "grid" in f]) for level in levels],
+                             grids_of(level), level.results.get("causes", {})) for level in levels],
                            {name: key_of(c) for name, c in profiles().items()}))
     counts = ", ".join(f"{level.name} {len(lightmap_results(level))}" for level in levels)
     refresh("pareto", f"`scripts/bench pareto --quality {options.quality}`; configurations measured, of "

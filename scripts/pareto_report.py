@@ -2,7 +2,7 @@
 import html
 import math
 
-WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 640, 400, 56, 44, 16, 16
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP, RIGHT = 640, 440, 68, 62, 16, 16
 DENSITY_COLOURS = {1: "#c9b458", 2: "#5aa469", 4: "#3b7dd8", 8: "#8e44ad"}
 PLOTS = [("update_us", "update of all light sets, microseconds"), ("bytes", "device memory, MB"),
          ("bake_s", "cook, CPU seconds")]
@@ -12,8 +12,8 @@ STYLE = """
 body { font: 16px/1.45 system-ui, sans-serif; color: var(--ink); background: var(--paper); margin: 0 auto;
        padding: 1rem; max-width: 1320px; }
 figure { margin: 0 0 1.5rem; } figcaption { font-weight: 600; margin-bottom: .3rem; }
-.plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 400px), 1fr)); gap: 1rem; }
-svg { width: 100%; height: auto; display: block; } svg text { fill: var(--ink); font-size: 13px; }
+.grid { max-width: 640px; } .plots { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(100%, 400px), 1fr)); gap: 1rem; }
+svg { width: 100%; height: auto; display: block; } svg text { fill: var(--ink); font-size: 19px; }
 .axis { stroke: var(--ink); } .line { stroke: var(--faint); } .front { fill: none; stroke: #d33; stroke-width: 2; }
 circle { fill-opacity: .55; } circle:hover { stroke: var(--ink); stroke-width: 2; fill-opacity: 1; }
 .default { fill: none; stroke: var(--ink); stroke-width: 2.5; }
@@ -57,12 +57,12 @@ class LogPlot:
         out = [f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{about}">']
         for t in ticks(self.x0, self.x1):
             out.append(f'<line class="line" x1="{self.x(t):.1f}" x2="{self.x(t):.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"/>'
-                       f'<text x="{self.x(t):.1f}" y="{HEIGHT - BOTTOM + 17}" text-anchor="middle">{t:g}</text>')
+                       f'<text x="{self.x(t):.1f}" y="{HEIGHT - BOTTOM + 23}" text-anchor="middle">{t:g}</text>')
         for t in ticks(self.y0, self.y1):
             out.append(f'<line class="line" x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{self.y(t):.1f}" y2="{self.y(t):.1f}"/>'
                        f'<text x="{LEFT - 6}" y="{self.y(t) + 4:.1f}" text-anchor="end">{t:g}</text>')
-        out.append(f'<text x="{(LEFT + WIDTH) / 2}" y="{HEIGHT - 6}" text-anchor="middle">{label}</text>'
-                   f'<text transform="translate(14 {HEIGHT / 2}) rotate(-90)" text-anchor="middle">mean error, %</text>')
+        out.append(f'<text x="{(LEFT + WIDTH) / 2}" y="{HEIGHT - 10}" text-anchor="middle">{label}</text>'
+                   f'<text transform="translate(18 {HEIGHT / 2}) rotate(-90)" text-anchor="middle">mean error, %</text>')
         self.parts = out
 
     def x(self, v):
@@ -133,7 +133,15 @@ def grid_plot(grids):
             plot.dot(probes, error, colour, f"{name}, {probes} probes: {error:.1f} %")
         if line:
             plot.name(*line[0], name)
-    return f"<div class=plots>{plot.finish()}</div>"
+    return f"<div class=grid>{plot.finish()}</div>"
+
+
+def causes_table(causes):
+    if not causes:
+        return ""
+    rows = "".join(f"<tr><td>{cause.replace('_', ' ')}<td>{100 * share:.2f}</tr>" for cause, share in causes.items())
+    return ("<h3>What the error comes from, as the desktop profile sets it, all on</h3><div class=scroll><table>"
+            f"<tr><th>cause<th>mean %</tr>{rows}</table></div>")
 
 
 def grid_table(grids):
@@ -146,21 +154,22 @@ def grid_table(grids):
 
 
 def report(levels, defaults):
-    """`levels`: (name, quality, lightmap figures, grid figures) each; `defaults`: profile -> key of its settings."""
+    """`levels`: (name, quality, lightmap figures, grid figures, error by cause) each; `defaults`: profile -> key of its settings."""
     body = ["<h1>Run time against error</h1>",
             "<p>Each point is a level cooked with other settings: hover, or touch, for which. The red line joins those "
             "that no other beats in both; circles mark what the shipped profiles set. Mean relative error over five "
             "states; both axes are logarithmic.</p>",
             '<p class="key">' + "".join(f'<span><i style="background:{c}"></i>{d} texels a metre</span>'
                                         for d, c in DENSITY_COLOURS.items()) + "</p>"]
-    for name, quality, figures, grids in levels:
+    for name, quality, figures, grids, causes in levels:
         device = next(iter(figures.values()))["device"]
         body.append(f"<h2>{html.escape(name)}, {quality}</h2><p>{len(figures)} configurations; update on "
                     f"{html.escape(device)}</p><div class=plots>")
         for cost, label in PLOTS:
             body.append(f"<figure><figcaption>Error against {label.split(',')[0]}</figcaption>"
                         f"{scatter(figures, cost, label, defaults)}</figure>")
-        body.append(f"</div>{defaults_table(figures, defaults)}{grid_table(grids)}")
+        body.append(f"</div>{defaults_table(figures, defaults)}{causes_table(causes)}"
+                    f"{grid_table(grids)}")
     return ("<!doctype html><html lang=en><meta charset=utf-8><title>Run time against error</title>"
             '<meta name=viewport content="width=device-width, initial-scale=1">'
             f"<style>{STYLE}</style><body>{chr(10).join(body)}</body></html>\n")

@@ -22,9 +22,10 @@ void printReport(const StressReport& r, const std::string& device) {
     fmt::print("{:<28}{:>16}{:>12}{:>14}\n", "runtime", "words compared", "different", "not a number");
     for (const StressTally& t : r.executors)
         fmt::print("{:<28}{:>16}{:>12}{:>14}\n", t.name, t.words, t.words_different, t.not_numbers);
-    fmt::print("\nmemory after a tenth of the run {}, at most {}, at the end {}; on devices {}, then {}\n",
+    fmt::print("\nmemory after a tenth of the run {}, at most {}, at the end {}; on devices {}, then {}{}\n",
                humanBytes(r.resident_start_bytes), humanBytes(r.resident_most_bytes), humanBytes(r.resident_end_bytes),
-               humanBytes(r.device_start_bytes), humanBytes(r.device_end_bytes));
+               humanBytes(r.device_start_bytes), humanBytes(r.device_end_bytes),
+               r.memoryJudged() ? "" : " (not judged: fewer than 100 checks)");
 }
 
 nlohmann::ordered_json toJson(const StressReport& r, const StressArguments& a, const std::string& device) {

@@ -35,8 +35,10 @@ struct StressReport {
     uint64_t device_start_bytes = 0, device_end_bytes = 0;
 
     bool exact() const;
-    // Within 1 % at the end of what it was at the start.
+    // Within 1 % at the end of what it was at the start. Not judged after fewer than 100 checks: memory that a driver
+    // gave out is resident only once it is touched, and it takes a while until every set was loaded everywhere.
     bool memoryFlat() const;
+    bool memoryJudged() const { return checks >= 100; }
 };
 
 // `device` null: CPU runtimes alone. An error is one that a runtime returned to a call that it should have taken; it
