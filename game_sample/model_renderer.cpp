@@ -74,9 +74,11 @@ Expected<ModelRenderer> ModelRenderer::create(const VulkanContext& vulkan, Runti
     if (lights.gridTable() != VK_NULL_HANDLE) DIMMER_TRY(renderer.addMovers(lights));
     DIMMER_TRY(renderer.createGeometry(vulkan));
     if (renderer.draws_.empty()) return renderer;
-    DIMMER_TRY(renderer.createDescriptors(vulkan, lights.probes(0)));
-    DIMMER_TRY(renderer.createLayout(vulkan.device));
-    auto pipeline = createModelPipeline(vulkan.device, renderer.layout_.get(), render_pass, extent);
+    auto bindings = StorageBindings::create(vulkan.device, {lights.probes(0), renderer.draw_data_.buffer.get()},
+                                            model_stages, sizeof(ModelConstants));
+    if (!bindings) return std::unexpected(bindings.error());
+    renderer.bindings_ = std::move(*bindings);
+    auto pipeline = createModelPipeline(vulkan.device, renderer.bindings_.layout(), render_pass, extent);
     if (!pipeline) return std::unexpected(pipeline.error());
     renderer.pipeline_ = std::move(*pipeline);
     return renderer;
@@ -130,55 +132,6 @@ Expected<void> ModelRenderer::createGeometry(const VulkanContext& vulkan) {
     return {};
 }
 
-Expected<void> ModelRenderer::createDescriptors(const VulkanContext& vulkan, VkBuffer probes) {
-    VkDescriptorSetLayoutBinding bindings[2]{};
-    for (uint32_t i = 0; i < 2; ++i) bindings[i] = {i, VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 1, model_stages, nullptr};
-    auto layout = vkStruct<VkDescriptorSetLayoutCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO);
-    layout.bindingCount = std::size(bindings);
-    layout.pBindings = bindings;
-    VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
-    DIMMER_VK(vkCreateDescriptorSetLayout, vulkan.device, &layout, nullptr, &set_layout);
-    set_layout_ = {vulkan.device, set_layout};
-
-    const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2};
-    auto pool_info = vkStruct<VkDescriptorPoolCreateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO);
-    pool_info.maxSets = 1;
-    pool_info.poolSizeCount = 1;
-    pool_info.pPoolSizes = &size;
-    VkDescriptorPool pool = VK_NULL_HANDLE;
-    DIMMER_VK(vkCreateDescriptorPool, vulkan.device, &pool_info, nullptr, &pool);
-    descriptor_pool_ = {vulkan.device, pool};
-
-    auto allocate = vkStruct<VkDescriptorSetAllocateInfo>(VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO);
-    allocate.descriptorPool = pool;
-    allocate.descriptorSetCount = 1;
-    allocate.pSetLayouts = &set_layout;
-    DIMMER_VK(vkAllocateDescriptorSets, vulkan.device, &allocate, &descriptors_);
-
-    const VkDescriptorBufferInfo infos[] = {{probes, 0, VK_WHOLE_SIZE}, {draw_data_.buffer.get(), 0, VK_WHOLE_SIZE}};
-    auto write = vkStruct<VkWriteDescriptorSet>(VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET);
-    write.dstSet = descriptors_;
-    write.descriptorCount = std::size(infos);  // runs on from binding 0 to binding 1
-    write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-    write.pBufferInfo = infos;
-    vkUpdateDescriptorSets(vulkan.device, 1, &write, 0, nullptr);
-    return {};
-}
-
-Expected<void> ModelRenderer::createLayout(VkDevice device) {
-    const VkDescriptorSetLayout set_layout = set_layout_.get();
-    const VkPushConstantRange range{model_stages, 0, sizeof(ModelConstants)};
-    auto info = vkStruct<VkPipelineLayoutCreateInfo>(VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO);
-    info.setLayoutCount = 1;
-    info.pSetLayouts = &set_layout;
-    info.pushConstantRangeCount = 1;
-    info.pPushConstantRanges = &range;
-    VkPipelineLayout layout = VK_NULL_HANDLE;
-    DIMMER_VK(vkCreatePipelineLayout, device, &info, nullptr, &layout);
-    layout_ = {device, layout};
-    return {};
-}
-
 Expected<void> ModelRenderer::move(double seconds, LightState& lights) {
     for (Mover& mover : movers_) {
         const double angle = 2 * glm::pi<double>() * std::fmod(seconds / turn_s, 1.0);
@@ -214,8 +167,7 @@ Expected<void> ModelRenderer::draw(VkCommandBuffer commands, const glm::mat4& cl
     const VkBuffer vertices = vertices_.buffer.get();
     const VkDeviceSize offset = 0;
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline_.get());
-    vkCmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, layout_.get(), 0, 1, &descriptors_, 0, nullptr);
-    vkCmdPushConstants(commands, layout_.get(), model_stages, 0, sizeof(constants), &constants);
+    bindings_.bind(commands, &constants);
     vkCmdBindVertexBuffers(commands, 0, 1, &vertices, &offset);
     vkCmdBindIndexBuffer(commands, indices_.buffer.get(), 0, VK_INDEX_TYPE_UINT32);
     for (uint32_t i = 0; i < draws_.size(); ++i)

@@ -1,6 +1,8 @@
 // Draws what light grids light: models that stand and models that move, through one path.
 #pragma once
 
+#include "storage_bindings.h"
+
 #include <dimmer/runtime.h>
 #include <gpu/memory.h>
 
@@ -37,8 +39,6 @@ class ModelRenderer {
     };
     Expected<void> addMovers(LightState& lights);
     Expected<void> createGeometry(const VulkanContext& vulkan);
-    Expected<void> createDescriptors(const VulkanContext& vulkan, VkBuffer probes);
-    Expected<void> createLayout(VkDevice device);
 
     explicit ModelRenderer(const Pack& pack) : pack_(pack) {}
     Pack pack_;
@@ -46,10 +46,7 @@ class ModelRenderer {
     std::vector<Draw> draws_;
     std::vector<Mover> movers_;
     GpuBuffer vertices_, indices_, draw_data_;
-    SetLayoutHandle set_layout_;
-    DescriptorPoolHandle descriptor_pool_;
-    VkDescriptorSet descriptors_ = VK_NULL_HANDLE;
-    PipelineLayoutHandle layout_;
+    StorageBindings bindings_;
     PipelineHandle pipeline_;
 };
 

@@ -1,6 +1,8 @@
 // Draws spheres that light probes light: moving balls, and the probes themselves.
 #pragma once
 
+#include "storage_bindings.h"
+
 #include <dimmer/runtime.h>
 #include <gpu/memory.h>
 
@@ -30,14 +32,8 @@ class SphereRenderer {
     void draw(VkCommandBuffer commands, const glm::mat4& clip_from_world, std::span<const Sphere> spheres) const;
 
    private:
-    Expected<void> createDescriptors(const VulkanContext& vulkan, VkBuffer probes);
-    Expected<void> createLayout(VkDevice device);
-
     GpuBuffer spheres_;
-    SetLayoutHandle set_layout_;
-    DescriptorPoolHandle descriptor_pool_;
-    VkDescriptorSet descriptors_ = VK_NULL_HANDLE;
-    PipelineLayoutHandle layout_;
+    StorageBindings bindings_;
     PipelineHandle pipeline_;
     float exposure_ = 1;
     uint32_t color_format_ = 0;
