@@ -14,8 +14,9 @@
 namespace dimmer::sample {
 namespace {
 
+constexpr std::string_view space = " \t\r";  // \r: of lines that end as on Windows
+
 std::string_view trim(std::string_view text) {
-    constexpr std::string_view space = " \t\r";
     const size_t first = text.find_first_not_of(space);
     return first == std::string_view::npos ? std::string_view()
                                            : text.substr(first, text.find_last_not_of(space) - first + 1);
@@ -33,7 +34,7 @@ class Words {
     std::string_view next() {
         const bool quoted = rest_.starts_with('"');
         const size_t begin = quoted ? 1 : 0;
-        const size_t end = std::min(rest_.find_first_of(quoted ? "\"" : " \t", begin), rest_.size());
+        const size_t end = std::min(rest_.find_first_of(quoted ? "\"" : space, begin), rest_.size());
         const std::string_view word = rest_.substr(begin, end - begin);
         rest_ = trim(rest_.substr(std::min(end + begin, rest_.size())));
         return word;

@@ -5,6 +5,7 @@
 #include <bake/final_gather.h>
 #include <bake/group_light.h>
 #include <bake/series.h>
+#include <models/scene_models.h>
 #include <probes/grid_bake.h>
 #include <probes/local_bake.h>
 
@@ -117,7 +118,7 @@ class Bake {
         baked_.light = Sparse<ReceiverLight>::Builder(texels_.size()).finish();
         if (settings_.grid.probes_max > 0) findGrid();
         if (std::ranges::count(turns_.follow, 1) > 0) followGroups();
-        addGroups(found_, baked_);
+        addGroups(found_, paths_, baked_);
         if (sites_) makeGrid();
         for (const auto* probes : {&baked_.grid.light, &baked_.local_light})
             for (size_t i = 0; i < probes->rows(); ++i)
@@ -130,11 +131,14 @@ class Bake {
 
    private:
     void findGroups() {
-        for (uint32_t g = 0; store_ && g < groups_; ++g)
-            if (found_[g] = store_->find(g); found_[g]) {
-                turns_.bake[g] = 0;
-                baked_.local_light = Sparse<ProbeTermLight>::Builder(found_[g]->local_light.rows()).finish();
-            }
+        size_t probes = 0;
+        for (const LocalGrid& grid : localGrids(rays_.scene(), 0)) probes += grid.probeCount();
+        baked_.local_light = Sparse<ProbeTermLight>::Builder(probes).finish();
+        for (uint32_t g = 0; store_ && g < groups_; ++g) {
+            found_[g] = store_->find(g);
+            if (found_[g] && !cook::fits(*found_[g], paths_, g, texels_.size(), probes)) found_[g].reset();
+            turns_.bake[g] = !found_[g];
+        }
         turns_.follow = turns_.bake;
     }
 
@@ -142,20 +146,30 @@ class Bake {
     // again, unless the store has what their surfaces send out.
     void findGrid() {
         if (store_)
-            if (auto grid = store_->findGrid()) {
+            if (auto grid = store_->findGrid(); grid && fits(*grid)) {
                 baked_.grid = std::move(*grid);
                 return;
             }
         auto choice = chooseSites(rays_, settings_.grid);
         if (!choice) return warnOfNoGrid(choice.error());
         choice_ = std::move(*choice);
-        sites_.emplace(choice_.blocks, groups_, store_);
+        sites_.emplace(choice_.blocks, paths_, store_);
         const auto asked = sites_->asked();
         for (uint32_t g = 0; store_ && g < groups_; ++g) {
             if (turns_.follow[g] || !asked[g]) continue;
             radiance_[g] = store_->findRadiance(g);
+            if (radiance_[g] && !cook::fits(*radiance_[g], gatherer().receiverCount(), paths_.termsOf(g).size()))
+                radiance_[g].reset();
             if (!radiance_[g]) turns_.follow[g] = 1;
         }
+    }
+
+    bool fits(const BakedGrid& baked) const {
+        const size_t probes = baked.grid.positions.size();
+        return cook::fits(baked.light, probes, paths_.termCount()) &&
+               std::ranges::all_of(baked.grid.tetrahedra, [&](const auto& t) {
+                   return std::ranges::all_of(t.probes, [&](uint32_t p) { return p < probes; });
+               });
     }
 
     const Gatherer& gatherer() {
@@ -169,7 +183,7 @@ class Bake {
     void followGroups() {
         followed_ = bakeGroups(gatherer(), settings_, turns_, progress_, baked_);
         for (uint32_t g = 0; store_ && g < groups_; ++g) {
-            if (turns_.bake[g]) store_->keep(g, lightOfGroup(baked_, g, followed_.bounces[g]));
+            if (turns_.bake[g]) store_->keep(g, lightOfGroup(baked_, paths_, g, followed_.bounces[g]));
             if (turns_.follow[g] && settings_.grid.probes_max > 0)
                 store_->keepRadiance(g, radianceOfGroup(followed_.radiance, paths_, g));
         }
@@ -177,11 +191,11 @@ class Bake {
 
     void makeGrid() {
         if (std::ranges::count(sites_->asked(), 1) > 0) {
-            addRadiance(radiance_, paths_, gatherer().receiverCount(), followed_.radiance);
+            addRadiance(radiance_, paths_, followed_.radiance);
             baked_.rays += sites_->trace(gatherer(), followed_.radiance, baked_.reports, settings_, progress_);
         }
         followed_ = {};
-        auto grid = bakeGrid(rays_, choice_, sites_->take(paths_), paths_.terms(), settings_.grid, progress_);
+        auto grid = bakeGrid(rays_, choice_, sites_->take(), paths_.terms(), settings_.grid, progress_);
         if (!grid) return warnOfNoGrid(grid.error());
         baked_.grid = std::move(*grid);
         if (store_) store_->keepGrid(baked_.grid);

@@ -92,10 +92,13 @@ DoorPaths::DoorPaths(const Scene& scene)
         for (const Conditions& other : paths_) joined_.push_back(find(join(path, other)));
     }
     term_of_.assign(paths_.size() * group_count_, no_term);
+    terms_of_.resize(group_count_);
     for (uint32_t p = 0; p < paths_.size(); ++p)
         for (uint32_t g = 0; g < group_count_; ++g) {
             if (!kept[g].contains(paths_[p])) continue;
             term_of_[p * group_count_ + g] = static_cast<uint32_t>(terms_.size());
+            number_in_group_.push_back(static_cast<uint32_t>(terms_of_[g].size()));
+            terms_of_[g].push_back(static_cast<uint32_t>(terms_.size()));
             terms_.push_back(makeTerm(g, paths_[p]));
             path_of_.push_back(p);
             only_door_.push_back(paths_[p].size() == 1 ? paths_[p][0] / 2 : no_door);

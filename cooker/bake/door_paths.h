@@ -56,6 +56,10 @@ class DoorPaths {
     const std::vector<Term>& terms() const { return terms_; }
     uint32_t termCount() const { return static_cast<uint32_t>(terms_.size()); }
     uint32_t groupCount() const { return group_count_; }
+    // Ascending.
+    const std::vector<uint32_t>& termsOf(uint32_t group) const { return terms_of_[group]; }
+    // The term's place among those of its group.
+    uint32_t numberInGroup(uint32_t term) const { return number_in_group_[term]; }
 
     // The path that needs `condition` too; no_path where none is kept or the two contradict.
     uint32_t with(uint32_t path, uint32_t condition) const { return with_[path * condition_count_ + condition]; }
@@ -88,6 +92,8 @@ class DoorPaths {
     std::vector<uint32_t> path_of_;             // per term
     std::vector<uint32_t> only_door_;           // per term
     std::vector<Term> terms_;
+    std::vector<uint32_t> number_in_group_;        // per term
+    std::vector<std::vector<uint32_t>> terms_of_;  // per group
 };
 
 }  // namespace dimmer::cook

@@ -3,14 +3,6 @@
 namespace dimmer::cook {
 namespace {
 
-// Per light group, its terms in ascending order.
-std::vector<std::vector<uint32_t>> termsOfGroups(const std::vector<Term>& terms, size_t groups) {
-    std::vector<std::vector<uint32_t>> of_group(groups);
-    for (uint32_t t = 0; t < terms.size(); ++t)
-        if (terms[t].group < groups) of_group[terms[t].group].push_back(t);
-    return of_group;
-}
-
 // What a group keeps of a receiver's light: all but the noise, which is of no use later.
 ReceiverLight inTerm(const ReceiverLight& l, uint32_t term) {
     return {term, l.light, 0, l.keep};
@@ -18,15 +10,19 @@ ReceiverLight inTerm(const ReceiverLight& l, uint32_t term) {
 ProbeTermLight inTerm(const ProbeTermLight& l, uint32_t term) {
     return {term, l.light, 0, 0};
 }
+TermLight inTerm(const TermLight& l, uint32_t term) {
+    return {term, l.value};
+}
 
+// Of `group`, whose terms are counted by themselves.
 template <class Entry>
-Sparse<Entry> partOf(const Sparse<Entry>& light, std::span<const uint32_t> own_index) {
+Sparse<Entry> partOf(const Sparse<Entry>& light, const DoorPaths& paths, uint32_t group) {
     return Sparse<Entry>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
         std::vector<Entry> row;
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (const Entry& l : light.row(i))
-                if (own_index[l.term] != no_term) row.push_back(inTerm(l, own_index[l.term]));
+                if (paths.terms()[l.term].group == group) row.push_back(inTerm(l, paths.numberInGroup(l.term)));
             emit(std::span<const Entry>(row));
         }
     });
@@ -56,32 +52,32 @@ Sparse<Entry> withParts(const Sparse<Entry>& light, const std::vector<Part<Entry
 
 }  // namespace
 
-GroupLight lightOfGroup(const Baked& baked, uint32_t group, uint32_t bounces) {
+bool fits(const GroupLight& light, const DoorPaths& paths, uint32_t group, size_t texels, size_t probes) {
+    const size_t terms = paths.termsOf(group).size();
+    return light.reports.size() == terms && fits(light.light, texels, terms) && fits(light.local_light, probes, terms);
+}
+
+GroupLight lightOfGroup(const Baked& baked, const DoorPaths& paths, uint32_t group, uint32_t bounces) {
     GroupLight out;
     out.bounces = bounces;
     out.door_flux = baked.door_flux[group];
-    std::vector<uint32_t> own_index(baked.terms.size(), no_term);
-    for (uint32_t t = 0; t < baked.terms.size(); ++t) {
-        if (baked.terms[t].group != group) continue;
-        own_index[t] = static_cast<uint32_t>(out.reports.size());
-        out.reports.push_back(baked.reports[t]);
-    }
-    out.light = partOf(baked.light, own_index);
-    out.local_light = partOf(baked.local_light, own_index);
+    for (const uint32_t t : paths.termsOf(group)) out.reports.push_back(baked.reports[t]);
+    out.light = partOf(baked.light, paths, group);
+    out.local_light = partOf(baked.local_light, paths, group);
     return out;
 }
 
-void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) {
-    const auto terms = termsOfGroups(baked.terms, groups.size());
+void addGroups(std::span<const std::optional<GroupLight>> groups, const DoorPaths& paths, Baked& baked) {
     std::vector<Part<ReceiverLight>> texels;
     std::vector<Part<ProbeTermLight>> probes;
     for (uint32_t g = 0; g < groups.size(); ++g) {
         if (!groups[g]) continue;
-        texels.push_back({&groups[g]->light, &terms[g]});
-        probes.push_back({&groups[g]->local_light, &terms[g]});
+        const auto& terms = paths.termsOf(g);
+        texels.push_back({&groups[g]->light, &terms});
+        probes.push_back({&groups[g]->local_light, &terms});
         baked.door_flux[g] = groups[g]->door_flux;
         baked.bounces = std::max(baked.bounces, groups[g]->bounces);
-        for (size_t k = 0; k < terms[g].size(); ++k) baked.reports[terms[g][k]] = groups[g]->reports[k];
+        for (size_t k = 0; k < terms.size(); ++k) baked.reports[terms[k]] = groups[g]->reports[k];
     }
     if (texels.empty()) return;
     baked.light = withParts(baked.light, texels);
@@ -89,34 +85,16 @@ void addGroups(std::span<const std::optional<GroupLight>> groups, Baked& baked) 
 }
 
 SparseLight radianceOfGroup(const SparseLight& radiance, const DoorPaths& paths, uint32_t group) {
-    const std::vector<uint32_t> terms = termsOfGroups(paths.terms(), paths.groupCount())[group];
-    return SparseLight::build(radiance.rows(), [&](size_t begin, size_t end, auto emit) {
-        std::vector<TermLight> row;
-        for (size_t i = begin; i < end; ++i) {
-            row.clear();
-            for (const TermLight& l : radiance.row(i))
-                if (const auto own = std::ranges::lower_bound(terms, l.term); own != terms.end() && *own == l.term)
-                    row.push_back({static_cast<uint32_t>(own - terms.begin()), l.value});
-            emit(std::span<const TermLight>(row));
-        }
-    });
+    return partOf(radiance, paths, group);
 }
 
-void addRadiance(std::span<const std::optional<SparseLight>> groups, const DoorPaths& paths, size_t receivers,
-                 SparseLight& radiance) {
-    const auto terms = termsOfGroups(paths.terms(), groups.size());
-    radiance = SparseLight::build(receivers, [&](size_t begin, size_t end, auto emit) {
-        std::vector<TermLight> row;
-        for (size_t i = begin; i < end; ++i) {
-            row.clear();
-            if (radiance.rows() > 0) row.assign(radiance.row(i).begin(), radiance.row(i).end());
-            for (size_t g = 0; g < groups.size(); ++g)
-                if (groups[g])
-                    for (const TermLight& l : groups[g]->row(i)) row.push_back({terms[g][l.term], l.value});
-            std::ranges::sort(row, {}, &TermLight::term);
-            emit(std::span<const TermLight>(row));
-        }
-    });
+void addRadiance(std::span<const std::optional<SparseLight>> groups, const DoorPaths& paths, SparseLight& radiance) {
+    std::vector<Part<TermLight>> parts;
+    for (uint32_t g = 0; g < groups.size(); ++g)
+        if (groups[g]) parts.push_back({&*groups[g], &paths.termsOf(g)});
+    if (parts.empty()) return;
+    if (radiance.rows() == 0) radiance = SparseLight::Builder(parts[0].light->rows()).finish();
+    radiance = withParts(radiance, parts);
 }
 
 }  // namespace dimmer::cook

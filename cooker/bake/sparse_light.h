@@ -97,6 +97,16 @@ class Sparse {
 
 using SparseLight = Sparse<TermLight>;
 
+// Whether light that comes from elsewhere is light of `rows` receivers and terms below `terms`.
+template <class Entry>
+bool fits(const Sparse<Entry>& light, size_t rows, size_t terms) {
+    if (light.rows() != rows) return false;
+    for (size_t i = 0; i < rows; ++i)
+        for (const Entry& l : light.row(i))
+            if (l.term >= terms) return false;
+    return true;
+}
+
 // One worker's dense scratch over terms, emptied in time proportional to what was touched (and a 64th of the rest).
 template <class Value>
 class TermAccumulator {

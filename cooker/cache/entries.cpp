@@ -68,40 +68,48 @@ std::vector<float> getFloats(ByteReader& in) {
     return values;
 }
 
-// What is kept of a ReceiverLight, besides its term.
+// What is kept of an entry besides its term: nothing but floats.
 struct StoredLight {
     Gathered light;
     float keep;
 };
-static_assert(sizeof(StoredLight) == 8 * sizeof(float));
 StoredLight stored(const ReceiverLight& l) {
     return {l.light, l.keep};
 }
-ReceiverLight restored(uint32_t term, const StoredLight& light) {
-    return {term, light.light, 0, light.keep};
-}
-// Of a ProbeTermLight.
-static_assert(sizeof(ProbeLight) == 27 * sizeof(float));
 const ProbeLight& stored(const ProbeTermLight& l) {
     return l.light;
 }
-ProbeTermLight restored(uint32_t term, const ProbeLight& light) {
-    return {term, light, 0, 0};
+const glm::vec3& stored(const TermLight& l) {
+    return l.value;
+}
+void restore(const StoredLight& from, ReceiverLight& l) {
+    l.light = from.light;
+    l.keep = from.keep;
+}
+void restore(const ProbeLight& from, ProbeTermLight& l) {
+    l.light = from;
+}
+void restore(const glm::vec3& from, TermLight& l) {
+    l.value = from;
 }
 
 template <class Entry>
-void putLight(ByteWriter& out, const Sparse<Entry>& light) {
-    using Stored = std::decay_t<decltype(stored(std::declval<Entry>()))>;
-    constexpr size_t floats = sizeof(Stored) / sizeof(float);
+using Stored = std::decay_t<decltype(stored(std::declval<Entry>()))>;
+template <class Entry>
+constexpr size_t stored_floats = sizeof(Stored<Entry>) / sizeof(float);
+
+// Counts, terms, and the values in columns of floats.
+template <class Entry>
+void putRows(ByteWriter& out, const Sparse<Entry>& light) {
     std::vector<uint16_t> counts, terms;
-    std::vector<float> columns(light.entryCount() * floats);
+    std::vector<float> columns(light.entryCount() * stored_floats<Entry>);
     size_t n = 0;
     for (size_t i = 0; i < light.rows(); ++i) {
         counts.push_back(static_cast<uint16_t>(light.row(i).size()));
         for (const Entry& l : light.row(i)) {
             terms.push_back(static_cast<uint16_t>(l.term));
-            const auto values = std::bit_cast<std::array<float, floats>>(stored(l));
-            for (size_t f = 0; f < floats; ++f) columns[f * light.entryCount() + n] = values[f];
+            const auto values = std::bit_cast<std::array<float, stored_floats<Entry>>>(stored(l));
+            for (size_t f = 0; f < values.size(); ++f) columns[f * light.entryCount() + n] = values[f];
             ++n;
         }
     }
@@ -111,13 +119,11 @@ void putLight(ByteWriter& out, const Sparse<Entry>& light) {
 }
 
 template <class Entry>
-std::optional<Sparse<Entry>> getLight(ByteReader& in, size_t term_count) {
-    using Stored = std::decay_t<decltype(stored(std::declval<Entry>()))>;
-    constexpr size_t floats = sizeof(Stored) / sizeof(float);
+std::optional<Sparse<Entry>> getRows(ByteReader& in) {
     const auto counts = in.getArray<uint16_t>();
     const auto terms = in.getArray<uint16_t>();
     const std::vector<float> columns = getFloats(in);
-    if (!in.ok() || columns.size() != terms.size() * floats) return {};
+    if (!in.ok() || columns.size() != terms.size() * stored_floats<Entry>) return {};
     typename Sparse<Entry>::Builder rows(counts.size());
     std::vector<Entry> row;
     size_t n = 0;
@@ -125,14 +131,23 @@ std::optional<Sparse<Entry>> getLight(ByteReader& in, size_t term_count) {
         row.clear();
         if (n + counts[i] > terms.size()) return {};
         for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
-            std::array<float, floats> values;
-            for (size_t f = 0; f < floats; ++f) values[f] = columns[f * terms.size() + n];
-            if (terms[n] >= term_count) return {};
-            row.push_back(restored(terms[n], std::bit_cast<Stored>(values)));
+            std::array<float, stored_floats<Entry>> values;
+            for (size_t f = 0; f < values.size(); ++f) values[f] = columns[f * terms.size() + n];
+            Entry& entry = row.emplace_back();
+            entry.term = terms[n];
+            restore(std::bit_cast<Stored<Entry>>(values), entry);
         }
         rows.put(i, row);
     }
     return rows.finish();
+}
+
+void visitGrid(auto& grid, auto&& visit) {
+    visit(grid.positions);
+    visit(grid.levels);
+    visit(grid.tetrahedra);
+    visit(grid.visibility);
+    visit(grid.starts);
 }
 
 }  // namespace
@@ -181,8 +196,8 @@ std::vector<std::byte> toBytes(const GroupLight& group) {
     putAll(out, group.reports);
     putAll(out, group.door_flux.alone);
     putAll(out, group.door_flux.pairs);
-    putLight(out, group.light);
-    putLight(out, group.local_light);
+    putRows(out, group.light);
+    putRows(out, group.local_light);
     return out.take();
 }
 
@@ -193,79 +208,21 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes) {
     group.reports = in.getArray<TermReport>();
     group.door_flux.alone = in.getArray<double>();
     group.door_flux.pairs = in.getArray<DoorFlux::Pair>();
-    auto light = getLight<ReceiverLight>(in, group.reports.size());
+    auto light = getRows<ReceiverLight>(in);
     if (!light) return {};
-    auto local = getLight<ProbeTermLight>(in, group.reports.size());
+    auto local = getRows<ProbeTermLight>(in);
     if (!local || !in.atEnd()) return {};
     group.light = std::move(*light);
     group.local_light = std::move(*local);
     return group;
 }
 
-namespace {
-
-// Rows of light: counts, terms, and the values in columns of floats. Value: nothing but floats.
-template <class Entry, class Value>
-void putRows(ByteWriter& out, const Sparse<Entry>& light, Value Entry::*value) {
-    constexpr size_t floats = sizeof(Value) / sizeof(float);
-    std::vector<uint16_t> counts, terms;
-    std::vector<float> columns(light.entryCount() * floats);
-    size_t n = 0;
-    for (size_t i = 0; i < light.rows(); ++i) {
-        counts.push_back(static_cast<uint16_t>(light.row(i).size()));
-        for (const Entry& l : light.row(i)) {
-            terms.push_back(static_cast<uint16_t>(l.term));
-            const auto values = std::bit_cast<std::array<float, floats>>(l.*value);
-            for (size_t f = 0; f < floats; ++f) columns[f * light.entryCount() + n] = values[f];
-            ++n;
-        }
-    }
-    putAll(out, counts);
-    putAll(out, terms);
-    putFloats(out, columns);
-}
-
-template <class Entry, class Value>
-std::optional<Sparse<Entry>> getRows(ByteReader& in, Value Entry::*value) {
-    constexpr size_t floats = sizeof(Value) / sizeof(float);
-    const auto counts = in.getArray<uint16_t>();
-    const auto terms = in.getArray<uint16_t>();
-    const std::vector<float> columns = getFloats(in);
-    if (!in.ok() || columns.size() != terms.size() * floats) return {};
-    typename Sparse<Entry>::Builder rows(counts.size());
-    std::vector<Entry> row;
-    size_t n = 0;
-    for (size_t i = 0; i < counts.size(); ++i) {
-        row.clear();
-        if (n + counts[i] > terms.size()) return {};
-        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
-            std::array<float, floats> values;
-            for (size_t f = 0; f < floats; ++f) values[f] = columns[f * terms.size() + n];
-            Entry& entry = row.emplace_back();
-            entry.term = terms[n];
-            entry.*value = std::bit_cast<Value>(values);
-        }
-        rows.put(i, row);
-    }
-    return rows.finish();
-}
-
-void visitGrid(auto& grid, auto&& visit) {
-    visit(grid.positions);
-    visit(grid.levels);
-    visit(grid.tetrahedra);
-    visit(grid.visibility);
-    visit(grid.starts);
-}
-
-}  // namespace
-
 std::vector<std::byte> toBytes(const BakedGrid& baked) {
     ByteWriter out;
     visitGrid(baked.grid, [&](const auto& values) { putAll(out, values); });
     out.put(baked.grid.start);
     out.put(baked.free_volume_m3);
-    putRows(out, baked.light, &ProbeTermLight::light);
+    putRows(out, baked.light);
     return out.take();
 }
 
@@ -275,7 +232,7 @@ std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
     visitGrid(baked.grid, [&](auto& values) { getAll(in, values); });
     baked.grid.start = in.get<StartGrid>();
     baked.free_volume_m3 = in.get<double>();
-    auto light = getRows<ProbeTermLight>(in, &ProbeTermLight::light);
+    auto light = getRows<ProbeTermLight>(in);
     if (!light || !in.atEnd()) return {};
     baked.light = std::move(*light);
     return baked;
@@ -287,7 +244,7 @@ std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites) {
     for (const SiteBlockLight& s : sites) {
         putAll(out, s.block.places_m);
         out.put(s.block.rays);
-        putRows(out, s.light, &ProbeTermLight::light);
+        putRows(out, s.light);
     }
     return out.take();
 }
@@ -299,7 +256,7 @@ std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::b
         SiteBlockLight s;
         getAll(in, s.block.places_m);
         s.block.rays = in.get<uint32_t>();
-        auto light = getRows<ProbeTermLight>(in, &ProbeTermLight::light);
+        auto light = getRows<ProbeTermLight>(in);
         if (!light || light->rows() != s.block.places_m.size()) return {};
         s.light = std::move(*light);
         sites.push_back(std::move(s));
@@ -309,13 +266,13 @@ std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::b
 
 std::vector<std::byte> toBytes(const SparseLight& radiance) {
     ByteWriter out;
-    putRows(out, radiance, &TermLight::value);
+    putRows(out, radiance);
     return out.take();
 }
 
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes) {
     ByteReader in(bytes);
-    auto light = getRows<TermLight>(in, &TermLight::value);
+    auto light = getRows<TermLight>(in);
     return light && in.atEnd() ? std::move(light) : std::nullopt;
 }
 

@@ -106,7 +106,8 @@ float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
             largest = std::max({largest, sum.x, sum.y, sum.z});
         }
     if (!(largest > 0) || !std::isfinite(largest)) return 1;
-    return std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -40.0f, 40.0f));
+    constexpr float most = exposure_log2_max;
+    return std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -most, most));
 }
 
 }  // namespace dimmer::cook

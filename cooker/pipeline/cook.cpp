@@ -394,7 +394,7 @@ Expected<std::vector<std::byte>> makePack(const Scene& scene, const CookOptions&
     if (!pack) return std::unexpected(pack.error());
     result.pack = std::move(*pack);
     Stopwatch watch(result.stats, "write");
-    return packBytes(result.pack);
+    return packBytes(result.pack, static_cast<int>(result.profile.quality(options.quality)->zstd_level));
 }
 
 // From the cache or anew. Fitted packs are made anew from what the cache has of their parts.

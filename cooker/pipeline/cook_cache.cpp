@@ -59,7 +59,7 @@ std::vector<std::string> partsOfGroup(const std::string& what) {
 
 CookCache::CookCache(CacheStore store, const std::filesystem::path& pack) : store_(std::move(store)) {
     std::error_code ignored;
-    const auto place = std::filesystem::weakly_canonical(pack, ignored);
+    const auto place = std::filesystem::weakly_canonical(std::filesystem::absolute(pack, ignored), ignored);
     ledger_ = KeyBuilder::ofAnyCode(ledger_kind).add(place.string()).finish();
     last_ = readLedger(store_.find(ledger_kind, ledger_).bytes);
     dependsOn("code", KeyBuilder("code").finish());

@@ -84,9 +84,9 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
     for (uint32_t g = 1; g < rungs.size(); ++g) {
         if (rungs[g] == 0) continue;
         const float from = thresholdOf(pack, profile, g);
-        if (!(from < 1)) continue;
+        if (!(from < threshold_max)) continue;
         remedy.changes.push_back({std::string(set_threshold_prefix) + pack.elements[g - 1].name, from,
-                                  std::min(1.0f, threshold_rungs[rungs[g]] * from)});
+                                  std::min(threshold_max, threshold_rungs[rungs[g]] * from)});
     }
     return remedy;
 }

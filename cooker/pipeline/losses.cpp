@@ -14,7 +14,8 @@ constexpr float floor_share = 0.01f;  // of the mean light, as in `dimmer verify
 uint8_t lostAt(const ReceiverLight& light, float threshold) {
     if (!std::isfinite(light.keep) || !(threshold > 0)) return threshold_rungs.size();
     uint8_t rung = 1;
-    while (rung < threshold_rungs.size() && light.keep >= threshold_rungs[rung] * threshold) ++rung;
+    while (rung < threshold_rungs.size() && light.keep >= std::min(threshold_max, threshold_rungs[rung] * threshold))
+        ++rung;
     return rung;
 }
 

@@ -13,6 +13,7 @@
 
 namespace dimmer::cook {
 
+inline constexpr float threshold_max = 1;  // what settings take at most
 // Thresholds that are tried, as multiples of the present ones.
 inline constexpr std::array<float, 13> threshold_rungs = {1, 1.5f, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
 

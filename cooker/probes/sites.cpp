@@ -180,13 +180,6 @@ class PlaceTrace {
     std::vector<uint32_t> wanted_in_group_;
 };
 
-// Per term, its number among those of its group.
-std::vector<uint32_t> numbersInGroups(const DoorPaths& paths) {
-    std::vector<uint32_t> counts(paths.groupCount()), number;
-    for (const Term& term : paths.terms()) number.push_back(counts[term.group]++);
-    return number;
-}
-
 std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
     std::vector<double> sums, counts;
     for (size_t i = 0; i < light.rows(); ++i) {
@@ -220,11 +213,15 @@ Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& setti
     return Chooser(rays, settings).run();
 }
 
-SiteLight::SiteLight(std::span<const SiteBlock> blocks, uint32_t groups, GroupStore* store)
-    : blocks_(blocks), store_(store), light_(groups, std::vector<SiteBlockLight>(blocks.size())) {
-    for (uint32_t g = 0; store && g < groups; ++g)
+SiteLight::SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, GroupStore* store)
+    : blocks_(blocks),
+      paths_(paths),
+      store_(store),
+      light_(paths.groupCount(), std::vector<SiteBlockLight>(blocks.size())) {
+    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
         for (SiteBlockLight& known : store->findSites(g, blocks))
-            if (const auto block = std::ranges::find(blocks, known.block); block != blocks.end())
+            if (const auto block = std::ranges::find(blocks, known.block);
+                block != blocks.end() && fits(known.light, block->places_m.size(), paths.termsOf(g).size()))
                 light_[g][static_cast<size_t>(block - blocks.begin())] = std::move(known);
 }
 
@@ -245,14 +242,13 @@ std::vector<uint32_t> SiteLight::missingAt(size_t block) const {
 }
 
 // Of one block and group, from what was traced at the block's places.
-Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t group, const DoorPaths& paths,
-                                          std::span<const uint32_t> number) {
+Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t group) const {
     return Sparse<ProbeTermLight>::build(rows.size(), [&](size_t begin, size_t end, auto emit) {
         Row row;
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (const ProbeTermLight& l : rows[i])
-                if (paths.terms()[l.term].group == group) row.push_back({number[l.term], l.light, 0, 0});
+                if (paths_.terms()[l.term].group == group) row.push_back({paths_.numberInGroup(l.term), l.light, 0, 0});
             emit(std::span<const ProbeTermLight>(row));
         }
     });
@@ -282,27 +278,22 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
                 traced += trace.trace(places[i].first, places[i].second, rows[i]);
             progress.advance(range.size());
         });
-        share(rows, blocks, groups, gatherer.paths());
+        share(rows, blocks, groups);
     }
     for (uint32_t g = 0; store_ && g < light_.size(); ++g)
         if (asked_groups[g]) store_->keepSites(g, light_[g]);
     return traced;
 }
 
-void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups,
-                      const DoorPaths& paths) {
-    const std::vector<uint32_t> number = numbersInGroups(paths);
+void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups) {
     for (const size_t b : blocks) {
         const auto here = rows.first(blocks_[b].places_m.size());
         rows = rows.subspan(here.size());
-        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g, paths, number)};
+        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g)};
     }
 }
 
-Sparse<ProbeTermLight> SiteLight::take(const DoorPaths& paths) {
-    const auto groups = static_cast<uint32_t>(light_.size());
-    std::vector<std::vector<uint32_t>> terms(groups);
-    for (uint32_t t = 0; t < paths.termCount(); ++t) terms[paths.terms()[t].group].push_back(t);
+Sparse<ProbeTermLight> SiteLight::take() {
     std::vector<std::pair<size_t, size_t>> where;  // block and row of each place
     for (size_t b = 0; b < blocks_.size(); ++b)
         for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) where.emplace_back(b, i);
@@ -310,9 +301,9 @@ Sparse<ProbeTermLight> SiteLight::take(const DoorPaths& paths) {
         std::vector<ProbeTermLight> row;
         for (size_t i = begin; i < end; ++i) {
             row.clear();
-            for (uint32_t g = 0; g < groups; ++g)
+            for (uint32_t g = 0; g < paths_.groupCount(); ++g)
                 for (const ProbeTermLight& l : light_[g][where[i].first].light.row(where[i].second))
-                    row.push_back({terms[g][l.term], l.light, 0, 0});
+                    row.push_back({paths_.termsOf(g)[l.term], l.light, 0, 0});
             std::ranges::sort(row, {}, &ProbeTermLight::term);
             emit(std::span<const ProbeTermLight>(row));
         }

@@ -31,7 +31,7 @@ Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& setti
 class SiteLight {
    public:
     // Takes from `store` (null: nothing) what it has.
-    SiteLight(std::span<const SiteBlock> blocks, uint32_t groups, GroupStore* store);
+    SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, GroupStore* store);
 
     // Per group: whether something of its light is to be traced.
     std::vector<uint8_t> asked() const;
@@ -40,18 +40,17 @@ class SiteLight {
     uint64_t trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
                    const BakeSettings& settings, Progress& progress);
     // Per place, ascending, what is active there. Empties this.
-    Sparse<ProbeTermLight> take(const DoorPaths& paths);
+    Sparse<ProbeTermLight> take();
 
    private:
     using Row = std::vector<ProbeTermLight>;
     std::vector<uint32_t> missingAt(size_t block) const;
-    void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups,
-               const DoorPaths& paths);
-    static Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group, const DoorPaths& paths,
-                                          std::span<const uint32_t> number);
+    void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
+    Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group) const;
     bool isMissing(uint32_t group, size_t block) const { return light_[group][block].light.rows() == 0; }
 
     std::span<const SiteBlock> blocks_;
+    const DoorPaths& paths_;
     GroupStore* store_;
     std::vector<std::vector<SiteBlockLight>> light_;  // per group, per block; no rows: missing
 };

@@ -22,12 +22,9 @@ using format::ByteWriter;
 using format::Chunk;
 using format::ChunkType;
 
-// zstd level: packs are written seldom and read often; 12 is where size stops paying for time on our levels.
-constexpr int compression_level = 12;
-
 class Writer {
    public:
-    explicit Writer(const PackData& data) : d_(data) {}
+    Writer(const PackData& data, int zstd_level) : d_(data), zstd_level_(zstd_level) {}
 
     std::vector<std::byte> write() {
         addTable(ChunkType::Elements, [&](ByteWriter& out) { putElements(out); });
@@ -80,13 +77,13 @@ class Writer {
         });
     }
 
-    static std::vector<std::byte> compressed(std::span<const std::byte> bytes, uint32_t record_bytes) {
+    std::vector<std::byte> compressed(std::span<const std::byte> bytes, uint32_t record_bytes) const {
         std::vector<std::byte> shuffled(bytes.size());
         const size_t count = bytes.size() / record_bytes;
         for (size_t b = 0; b < record_bytes; ++b)
             for (size_t i = 0; i < count; ++i) shuffled[b * count + i] = bytes[i * record_bytes + b];
         std::vector<std::byte> stored(ZSTD_compressBound(shuffled.size()));
-        stored.resize(ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), compression_level));
+        stored.resize(ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), zstd_level_));
         return stored;
     }
 
@@ -254,6 +251,7 @@ class Writer {
     }
 
     const PackData& d_;
+    const int zstd_level_;
     std::vector<Chunk> chunks_;
     std::vector<Content> contents_;  // moving one leaves its bytes where they are
     std::vector<std::vector<std::byte>> bodies_;
@@ -305,8 +303,8 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
 
 }  // namespace
 
-std::vector<std::byte> packBytes(const PackData& data) {
-    return Writer(data).write();
+std::vector<std::byte> packBytes(const PackData& data, int zstd_level) {
+    return Writer(data, zstd_level).write();
 }
 
 std::mutex& fileReplacement() {

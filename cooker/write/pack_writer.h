@@ -11,8 +11,8 @@
 
 namespace dimmer::cook {
 
-// The same data gives the same bytes.
-std::vector<std::byte> packBytes(const PackData& data);
+// The same data and level give the same bytes. `zstd_level`: 1..19; what reads the pack need not know.
+std::vector<std::byte> packBytes(const PackData& data, int zstd_level = 12);
 
 // Whether a file of that name can be expected to be writable; asked before hours of work, not after.
 Expected<void> checkWritable(const std::filesystem::path& path);

@@ -26,6 +26,8 @@
 namespace dimmer {
 
 inline constexpr float luminance_r = 0.2126f, luminance_g = 0.7152f, luminance_b = 0.0722f;
+// A sunlit snow field to a moonless night, and then some: light over the exposure stays far from a float's limits.
+inline constexpr int exposure_log2_max = 40;    // and no less than its negative
 inline constexpr float highlight_z_min = 0.1f;  // closer to the surface, b would outgrow its 10 bits
 
 inline float luminance(float r, float g, float b) {

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <format/texel.h>
 #include <pack/batches.h>
 #include <pack/pack_data.h>
 
@@ -32,7 +33,8 @@ Expected<void> validatePages(const PackData& d) {
         return unusable("its colour format {} is unknown", static_cast<uint32_t>(d.color_format));
     if (d.direction_model != DirectionModel::Ahd && d.direction_model != DirectionModel::Linear)
         return unusable("its directional model {} is unknown", static_cast<uint32_t>(d.direction_model));
-    if (!std::isfinite(d.exposure) || d.exposure <= 0) return unusable("its exposure is {}", d.exposure);
+    const float brightest = std::ldexp(1.0f, exposure_log2_max);
+    if (!(d.exposure >= 1 / brightest && d.exposure <= brightest)) return unusable("its exposure is {}", d.exposure);
     return {};
 }
 
@@ -270,23 +272,23 @@ Expected<void> validateMeshes(const PackData& d) {
 Expected<void> validateModels(const PackData& d) {
     for (const ModelMesh& m : d.model_meshes) {
         if (!finite(m.min_m) || !finite(m.max_m) || !finite(m.reflectance) || !finite(m.emission_cd_m2))
-            return bad("the mesh of model '{}' has a box or colour that is not finite", m.name);
+            return unusable("the mesh of model '{}' has a box or colour that is not finite", m.name);
         const bool no_set = m.emission_set && (*m.emission_set >= d.elements.size() ||
                                                d.elements[*m.emission_set].kind != ElementKind::LightSet);
-        if (no_set) return bad("the mesh of model '{}' shines with no such light set", m.name);
-        if (m.indices.size() % 3 != 0) return bad("the mesh of model '{}' has a broken triangle", m.name);
+        if (no_set) return unusable("the mesh of model '{}' shines with no such light set", m.name);
+        if (m.indices.size() % 3 != 0) return unusable("the mesh of model '{}' has a broken triangle", m.name);
         if (!std::ranges::all_of(m.indices, [&](uint32_t i) { return i < m.vertices.size(); }))
-            return bad("the mesh of model '{}' has an index past its vertices", m.name);
+            return unusable("the mesh of model '{}' has an index past its vertices", m.name);
     }
     for (const PlacedModel& m : d.models) {
         if (m.first_mesh > d.model_meshes.size() || m.mesh_count > d.model_meshes.size() - m.first_mesh)
-            return bad("model '{}' has meshes that are not there", m.node);
+            return unusable("model '{}' has meshes that are not there", m.node);
         if (m.local_grid &&
             (*m.local_grid >= d.probes.local.size() || d.probes.local[*m.local_grid].first_probe == no_probe))
-            return bad("model '{}' has a light grid that is not there", m.node);
+            return unusable("model '{}' has a light grid that is not there", m.node);
         if (!std::ranges::all_of(m.world_from_model.rows, [](const auto& row) { return finite(row); }) ||
             !finite(m.min_m) || !finite(m.max_m))
-            return bad("model '{}' stands nowhere", m.node);
+            return unusable("model '{}' stands nowhere", m.node);
     }
     return {};
 }

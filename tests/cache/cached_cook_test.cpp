@@ -237,6 +237,25 @@ TEST_F(CachedCook, SaysWhy) {
     EXPECT_EQ(why(level, "charts"), "first cook of this pack here");
 }
 
+TEST_F(CachedCook, KnowsAPackByItsPlaceHoweverItIsNamed) {
+    const auto before = std::filesystem::current_path();
+    std::filesystem::current_path(folder.path);
+    SilentProgress silent;
+    const CookOptions options{.level = writeLevel(folder, houseOfTwo()),
+                              .pack = "here.dimmer",  // not there yet, then there
+                              .profile = profile,
+                              .quality = "draft",
+                              .cache = folder.path / "cache"};
+    cook(options, silent);
+    LevelFile brighter = houseOfTwo();
+    lamp(brighter, 1)["intensity"] = 50;
+    writeLevel(folder, brighter);
+    const auto again = cook(options, silent);
+    std::filesystem::current_path(before);
+    ASSERT_TRUE(again.has_value()) << again.error().message;
+    for (const CacheLine& line : again->stats.cache) EXPECT_NE(line.why, "first cook of this pack here") << line.what;
+}
+
 TEST_F(CachedCook, AFolderThatTakesNothingIsAWarning) {
     writeText(folder, "cache", "a file where the folder should be");
     const CookResult result = run(houseOfTwo(), true);

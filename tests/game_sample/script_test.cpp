@@ -100,6 +100,11 @@ TEST(SampleScript, ReadsFadesAndFlicker) {
     EXPECT_EQ(std::get<Fade>(script.steps[2].action).element, "door:front");
 }
 
+TEST(SampleScript, TakesCarriageReturnsForSpaces) {
+    const Script script = parse("at 3 fade door:front\r\r 0 1 over 4\r\n");
+    EXPECT_EQ(std::get<Fade>(script.steps[0].action).element, "door:front");
+}
+
 TEST(SampleScript, ReadsViews) {
     const Script script = parse("camera 0 1 0 look 0 1 -5 fov 90\nat 4 move overview over 20");
     EXPECT_EQ(script.camera.forward, glm::vec3(0, 0, -1));

@@ -40,6 +40,8 @@ const Fault page_faults[] = {
     {"exposure NaN", [](PackData& d) { d.exposure = nan; }, "exposure"},
     {"exposure infinite", [](PackData& d) { d.exposure = infinity; }, "exposure"},
     {"exposure 0", [](PackData& d) { d.exposure = 0; }, "exposure is 0"},
+    {"exposure tiny", [](PackData& d) { d.exposure = 2.9e-41f; }, "exposure"},
+    {"exposure huge", [](PackData& d) { d.exposure = 1e30f; }, "exposure"},
     {"exposure negative", [](PackData& d) { d.exposure = -1; }, "exposure is -1"},
 };
 
