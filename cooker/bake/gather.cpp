@@ -144,18 +144,8 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
         const glm::vec3 world = guide.sample(u.z, {u.x, u.y});
         const glm::vec3 d = toTangent(origin, world);
         if (!(Light::Intake::weight(d) > 0)) continue;
-        follow<Light>({from,
-                       options,
-                       outgoing,
-                       sum,
-                       nullptr,
-                       aims,
-                       static_cast<uint32_t>(a + 1),
-                       options.rays + i,
-                       point,
-                       origin.position_m,
-                       world,
-                       d},
+        follow<Light>({from, options, outgoing, sum, nullptr, aims, static_cast<uint32_t>(a + 1), options.rays + i,
+                       point, origin.position_m, world, d},
                       seed + index);
     }
 }
@@ -329,7 +319,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
                            const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
                            if (term != no_term && sum.wants(term))
                                sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)),
-                                              Light::weightsOf(d));
+                                             Light::weightsOf(d));
                        });
         }
     }
