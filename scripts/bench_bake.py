@@ -199,10 +199,24 @@ def house_variant(folder, name, rename):
     return file
 
 
+def door_variant(folder, name, doors):
+    """The house without its combinations, and without its doors: leaves as plain geometry."""
+    level = json.loads(HOUSE.read_text())
+    level["scenes"][0]["extras"].pop("dimmer_combinations")
+    for node in level["nodes"] if not doors else []:
+        extras = node.get("extras", {})
+        for key in [key for key in extras if key.startswith("dimmer_door")]:
+            extras.pop(key)
+    shutil.copy(HOUSE.parent / "house.bin", folder)
+    file = folder / f"{name}.gltf"
+    file.write_text(json.dumps(level))
+    return file
+
+
 def cook_seconds(level, quality, folder, *options):
     """Processor seconds of a cook, what it traced and what it stored."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    text = dimmer("cook", level, "-o", folder / "sets.dimmer", "--quality", quality, *options)
+    text = dimmer("cook", level, "-o", folder / "sets.dimmer", "--no-cache", "--quality", quality, *options)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     overlap = json.loads(dimmer("inspect", folder / "sets.dimmer", "--json", "-"))
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, text, overlap
@@ -233,6 +247,28 @@ def sets_table(folder, runs=3):
     return table(["quality", "the house with", "CPU s", "times the base", "rays", "mean overlap"], rows)
 
 
+def doors_table(folder, runs=3):
+    """What the house's three doors cost: leaves as plain geometry, doors without their pairs, doors as they are."""
+    variants = [("no doors", door_variant(folder, "plain", False)),
+                ("3 doors, no combinations", door_variant(folder, "doors", True)),
+                ("3 doors and their pairs", HOUSE)]
+    rows = []
+    for quality in ("draft", "preview"):
+        taken = {name: [] for name, _ in variants}
+        for _ in range(runs):
+            for name, level in variants:
+                taken[name].append(cook_seconds(level, quality, folder))
+        first = statistics.median(t[0] for t in taken[variants[0][0]])
+        for name, _ in variants:
+            seconds = statistics.median(t[0] for t in taken[name])
+            rays = taken[name][0][1].split(" rays")[0].split(", ")[-1]
+            kilobytes = taken[name][0][2]["bytes"]["dynamic"] / 1000
+            rows.append([quality, name, f"{seconds:.2f}", f"{100 * (seconds / first - 1) / 3:.0f} %", rays,
+                         f"{kilobytes:.0f} kB"])
+            print(*rows[-1], flush=True)
+    return table(["quality", "the house with", "CPU s", "per door", "rays", "records"], rows)
+
+
 def refresh(topic, text):
     begin, end = f"<!-- {topic}: begin -->", f"<!-- {topic}: end -->"
     page = PAGE.read_text()
@@ -249,7 +285,7 @@ def main():
     parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
-    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets"], help="one part of it")
+    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets", "doors"], help="one part of it")
     options = parser.parse_args()
     levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
     if not levels:
@@ -258,6 +294,8 @@ def main():
         folder = pathlib.Path(name)
         if options.only in (None, "sets"):
             refresh("sets", "`scripts/bench bake --only sets`\n\n" + sets_table(folder))
+        if options.only in (None, "doors"):
+            refresh("doors", "`scripts/bench bake --only doors`\n\n" + doors_table(folder))
         if levels and options.only in (None, "reference"):
             refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
                     + reference_table(levels, options.paths, folder))

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <vector>
 
 namespace dimmer::cook {
 
@@ -30,7 +31,24 @@ class CellGrid {
         return origin_ + (glm::vec3(c) + 0.5f) * cell_m_;
     }
 
+    // Marks the cells that a ray passes and, around its end, those that the surface there lies in: generously, since
+    // surfaces are what receives. `spread`: the way to the neighbouring rays, per metre from where they start.
+    void mark(glm::vec3 from, glm::vec3 direction, float distance_m, float spread, std::vector<uint8_t>& marks) const {
+        for (float m = 0; m < distance_m; m += step_share * cell_m_)
+            markAround(from + direction * m, spread * m, marks);
+        markAround(from + direction * distance_m, std::max(0.5f * cell_m_, spread * distance_m), marks);
+    }
+
    private:
+    void markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const {
+        const glm::uvec3 low = coordinates(point - reach_m), high = coordinates(point + reach_m);
+        for (uint32_t z = low.z; z <= high.z; ++z)
+            for (uint32_t y = low.y; y <= high.y; ++y)
+                for (uint32_t x = low.x; x <= high.x; ++x) marks[index({x, y, z})] = 1;
+    }
+
+    // Rays are followed in steps of this share of a cell: short enough not to cut more than corners.
+    static constexpr float step_share = 0.5f;
     static constexpr float cell_min_m = 2;
     static constexpr float cells_per_axis_max = 48;
 

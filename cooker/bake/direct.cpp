@@ -41,8 +41,9 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
                            const uint32_t term = paths.term(groupOf(light.light_set), path);
                            if (term == no_term) return;
                            const glm::vec3 lux = lit.irradiance_lux * (weight * passed / static_cast<float>(used));
-                           reflected[term].add(lux, direction);
-                           if (light.bake == BakeMode::Full) stored[term].add(lux, direction);
+                           const auto weights = Light::weightsOf(direction);
+                           reflected[term].add(lux, weights);
+                           if (light.bake == BakeMode::Full) stored[term].add(lux, weights);
                        });
         }
     });

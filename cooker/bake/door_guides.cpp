@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace dimmer::cook {
@@ -146,70 +147,97 @@ DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint
 
 Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal) {
     const bool everywhere = normal == glm::vec3(0);
+    std::array<glm::vec3, patch_boxes_max + 1> side_area_m2;
     float patches = 0, door = 0;
     for (size_t b = 0; b < boxes.size(); ++b) {
-        Target t{boxes[b].low - point, boxes[b].high - point, 0, glm::vec3(0), glm::vec3(0)};
-        const glm::vec3 size = t.high - t.low, centre = 0.5f * (t.low + t.high);
-        t.side_area_m2 = {size.y * size.z, size.z * size.x, size.x * size.y};
+        const glm::vec3 low = boxes[b].low - point, high = boxes[b].high - point;
+        const glm::vec3 size = high - low, centre = 0.5f * (low + high);
+        const glm::vec3 area_m2 = {size.y * size.z, size.z * size.x, size.x * size.y};
         const float distance2 = glm::dot(centre, centre) + 0.25f * glm::dot(size, size);
+        glm::vec3 side_chance(0);
         float seen = 0;
         for (int axis = 0; axis < 3; ++axis) {
-            if (!(t.low[axis] > 0 || t.high[axis] < 0)) continue;  // the point lies between the two sides
-            const float away = t.low[axis] > 0 ? t.low[axis] : -t.high[axis];
-            t.side_chance[axis] = t.side_area_m2[axis] * away / (distance2 * std::sqrt(distance2));
-            seen += t.side_chance[axis];
+            if (!(low[axis] > 0 || high[axis] < 0)) continue;  // the point lies between the two sides
+            const float away = low[axis] > 0 ? low[axis] : -high[axis];
+            side_chance[axis] = area_m2[axis] * away / (distance2 * std::sqrt(distance2));
+            seen += side_chance[axis];
         }
-        const glm::vec3 highest(normal.x > 0 ? t.high.x : t.low.x, normal.y > 0 ? t.high.y : t.low.y,
-                                normal.z > 0 ? t.high.z : t.low.z);
+        const glm::vec3 highest(normal.x > 0 ? high.x : low.x, normal.y > 0 ? high.y : low.y,
+                                normal.z > 0 ? high.z : low.z);
         // A patch on the point's own surface sends nothing there.
         if (!(seen > 0)) continue;
         if (!everywhere && !(glm::dot(highest, normal) > (b == 0 ? 0 : 2 * inflate_m))) continue;
-        t.side_chance /= seen;
         const float cosine = everywhere ? 1 : std::max(cosine_min, glm::dot(centre, normal) / std::sqrt(distance2));
-        const float area_m2 = std::max(t.side_area_m2.x, std::max(t.side_area_m2.y, t.side_area_m2.z));
-        t.chance = b == 0 ? 1 : boxes[b].flux / area_m2 * seen * cosine;
-        (b == 0 ? door : patches) += t.chance;
-        targets_[count_++] = t;
+        const float largest_m2 = std::max(area_m2.x, std::max(area_m2.y, area_m2.z));
+        chance_[count_] = b == 0 ? 1 : boxes[b].flux / largest_m2 * seen * cosine;
+        (b == 0 ? door : patches) += chance_[count_];
+        side_area_m2[count_] = area_m2;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto a = static_cast<size_t>(axis);
+            low_[a][count_] = low[axis];
+            high_[a][count_] = high[axis];
+            side_chance_[a][count_] = side_chance[axis] / seen;
+        }
+        ++count_;
     }
     if (count_ == 0) return;
     const float of_door = door > 0 ? (patches > 0 ? door_share : 1) : 0;
     for (uint32_t i = 0; i < count_; ++i) {
         const bool is_door = i == 0 && door > 0;
-        targets_[i].chance = is_door ? of_door : targets_[i].chance / patches * (1 - of_door);
+        chance_[i] = is_door ? of_door : chance_[i] / patches * (1 - of_door);
+        for (size_t a = 0; a < 3; ++a)
+            if (side_chance_[a][i] > 0)
+                density_m2_[a][i] = chance_[i] * side_chance_[a][i] / side_area_m2[i][static_cast<int>(a)];
     }
 }
 
 glm::vec3 Guide::sample(float choice, glm::vec2 u) const {
     uint32_t i = 0;
-    for (; i + 1 < count_ && choice >= targets_[i].chance; ++i) choice -= targets_[i].chance;
-    const Target& t = targets_[i];
-    choice = std::clamp(choice / t.chance, 0.0f, 1.0f);
-    int axis = 0;
-    for (; axis < 2 && choice >= t.side_chance[axis]; ++axis) choice -= t.side_chance[axis];
-    while (t.side_chance[axis] <= 0) axis = (axis + 2) % 3;  // rounding may have run past the last side
-    const int across = (axis + 1) % 3, along = (axis + 2) % 3;
-    glm::vec3 place;
-    place[axis] = t.low[axis] > 0 ? t.low[axis] : t.high[axis];
-    place[across] = glm::mix(t.low[across], t.high[across], u.x);
-    place[along] = glm::mix(t.low[along], t.high[along], u.y);
-    return glm::normalize(place);
+    for (; i + 1 < count_ && choice >= chance_[i]; ++i) choice -= chance_[i];
+    choice = std::clamp(choice / chance_[i], 0.0f, 1.0f);
+    size_t axis = 0;
+    for (; axis < 2 && choice >= side_chance_[axis][i]; ++axis) choice -= side_chance_[axis][i];
+    while (side_chance_[axis][i] <= 0) axis = (axis + 2) % 3;  // rounding may have run past the last side
+    const size_t across = (axis + 1) % 3, along = (axis + 2) % 3;
+    std::array<float, 3> place;
+    place[axis] = low_[axis][i] > 0 ? low_[axis][i] : high_[axis][i];
+    place[across] = glm::mix(low_[across][i], high_[across][i], u.x);
+    place[along] = glm::mix(low_[along][i], high_[along][i], u.y);
+    return glm::normalize(glm::vec3(place[0], place[1], place[2]));
 }
 
+// Eight boxes at a time: this is asked for along every ray, for every guide.
 float Guide::pdf(glm::vec3 direction) const {
-    float sum = 0;
-    const glm::vec3 inverse = 1.0f / direction;
-    for (uint32_t i = 0; i < count_; ++i) {
-        const Target& t = targets_[i];
-        const glm::vec3 a = t.low * inverse, b = t.high * inverse;
-        const glm::vec3 near = glm::min(a, b), far = glm::max(a, b);
-        const int axis = near.x >= near.y && near.x >= near.z ? 0 : near.y >= near.z ? 1 : 2;
-        const float distance = near[axis];
-        if (!(distance > 0) || !(distance <= std::min(far.x, std::min(far.y, far.z)))) continue;
-        // From uniform on a side to directions: squared distance over area and cosine.
-        if (t.side_chance[axis] > 0)
-            sum += t.chance * t.side_chance[axis] * distance * distance /
-                   (t.side_area_m2[axis] * std::abs(direction[axis]));
+    using Eight [[gnu::vector_size(32)]] = float;
+    constexpr size_t lanes = sizeof(Eight) / sizeof(float);
+    const glm::vec3 inverse = 1.0f / direction, steepness = glm::abs(inverse);
+    PerTarget share;
+    for (size_t i = 0; i < count_; i += lanes) {
+        Eight near[3], far[3], density[3];
+        for (size_t a = 0; a < 3; ++a) {
+            Eight low, high;
+            std::memcpy(&low, &low_[a][i], sizeof low);
+            std::memcpy(&high, &high_[a][i], sizeof high);
+            std::memcpy(&density[a], &density_m2_[a][i], sizeof low);
+            low *= inverse[static_cast<int>(a)];
+            high *= inverse[static_cast<int>(a)];
+            near[a] = low < high ? low : high;
+            far[a] = low < high ? high : low;
+            // From uniform on a side to directions: squared distance over area and cosine.
+            density[a] *= steepness[static_cast<int>(a)];
+        }
+        Eight distance = near[0], found = density[0], end = far[0];
+        for (size_t a = 1; a < 3; ++a) {
+            found = near[a] > distance ? density[a] : found;
+            distance = near[a] > distance ? near[a] : distance;
+            end = far[a] < end ? far[a] : end;
+        }
+        // Not what a side that is never aimed at makes of an infinite steepness.
+        const Eight of_box = distance > 0 && distance <= end && found > 0 ? found * distance * distance : Eight{};
+        std::memcpy(&share[i], &of_box, sizeof of_box);
     }
+    float sum = 0;
+    for (uint32_t i = 0; i < count_; ++i) sum += share[i];
     return sum;
 }
 

@@ -55,14 +55,14 @@ class Guide {
     float pdf(glm::vec3 direction) const;
 
    private:
-    struct Target {
-        glm::vec3 low, high;    // from the point
-        float chance;           // of the box
-        glm::vec3 side_chance;  // by the side's axis, within the box
-        glm::vec3 side_area_m2;
-    };
+    static constexpr size_t most = (patch_boxes_max + 1 + 7) / 8 * 8;  // whole registers
+    using PerTarget = std::array<float, most>;
+
+    // Of every box: its corners, from the point; its chance; by axis, the chance within the box of the side across it,
+    // and the density on that side per area, over all.
     uint32_t count_ = 0;
-    std::array<Target, patch_boxes_max + 1> targets_;
+    std::array<PerTarget, 3> low_{}, high_{}, side_chance_, density_m2_{};
+    PerTarget chance_;
 };
 
 }  // namespace dimmer::cook

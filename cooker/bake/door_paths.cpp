@@ -101,6 +101,7 @@ DoorPaths::DoorPaths(const Scene& scene)
             terms_of_[g].push_back(static_cast<uint32_t>(terms_.size()));
             terms_.push_back(makeTerm(g, paths_[p]));
             path_of_.push_back(p);
+            group_of_.push_back(g);
             only_door_.push_back(paths_[p].size() == 1 ? paths_[p][0] / 2 : no_door);
         }
 }
@@ -109,12 +110,12 @@ uint32_t DoorPaths::moved(uint32_t from, uint32_t path, uint32_t own) const {
     uint32_t behind = path_of_[from];
     if (own != no_condition) behind = without_[behind * condition_count_ + own];
     if (behind == no_path) return no_term;
-    return term(terms_[from].group, joined_[path * paths_.size() + behind]);
+    return term(group_of_[from], joined_[path * paths_.size() + behind]);
 }
 
 uint32_t DoorPaths::leaving(uint32_t from, uint32_t own) const {
     if (own == no_condition) return from;
-    return term(terms_[from].group, with(path_of_[from], own));
+    return term(group_of_[from], with(path_of_[from], own));
 }
 
 }  // namespace dimmer::cook

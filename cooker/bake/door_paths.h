@@ -89,7 +89,7 @@ class DoorPaths {
     std::vector<uint32_t> without_;             // path, condition: without it; no_path where it needs the opposite
     std::vector<uint32_t> joined_;              // path, path
     std::vector<uint32_t> term_of_;             // path, group
-    std::vector<uint32_t> path_of_;             // per term
+    std::vector<uint32_t> path_of_, group_of_;  // per term
     std::vector<uint32_t> only_door_;           // per term
     std::vector<Term> terms_;
     std::vector<uint32_t> number_in_group_;        // per term

@@ -15,6 +15,15 @@ namespace {
 constexpr float choice_share_min = 1e-3f;
 // A group that fills less than this share of the hemisphere from a cell is left to them too.
 constexpr float coverage_min = 1e-5f;
+// Every emitter sends out some of its group's rays, up to so many in all.
+constexpr uint32_t rays_per_emitter = 128, probe_rays_max = 65536;
+constexpr float lift_m = 1e-3f;  // off the emitter
+
+// Uniform on a triangle: fold the unit square.
+glm::vec3 pointOn(const Emitter& e, glm::vec2 u) {
+    const float root = std::sqrt(u.x);
+    return e.corner + e.edge1 * (root * (1 - u.y)) + e.edge2 * (root * u.y);
+}
 
 }  // namespace
 
@@ -49,8 +58,14 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
 
     grid_ = {rays.boundsMin(), rays.boundsMax()};
     cells_.resize(grid_.count());
-    const float radius = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
-    tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(cells_[i], grid_.centre(i), radius); });
+    std::vector<std::span<const Emitter>> groups;
+    for (size_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
+        while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
+        groups.push_back({&emitters_[begin], end - begin});
+    }
+    std::vector<std::vector<uint8_t>> lit(groups.size());
+    tbb::parallel_for(size_t{0}, groups.size(), [&](size_t g) { lit[g] = litCells(rays, groups[g]); });
+    tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(i, lit); });
     first_range_.push_back(0);
     for (Cell& cell : cells_) {
         for (GroupRange r : cell.ranges) {
@@ -63,8 +78,36 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     cells_ = {};
 }
 
-void EmitterSampler::fillCell(Cell& cell, glm::vec3 centre, float radius_m) const {
-    for (size_t begin = 0; begin < emitters_.size();) {
+std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<const Emitter> of_group) const {
+    const auto emitters = static_cast<uint32_t>(of_group.size());
+    const uint32_t count = std::clamp(rays_per_emitter * emitters, emitter_probe_rays, probe_rays_max);
+    const uint32_t seed = identities_[of_group[0].group];
+    // No direction of a hemisphere is further from its nearest ray; those of neighbouring emitters help one another.
+    const float far_m = glm::length(rays.boundsMax() - rays.boundsMin());
+    const float spread = std::sqrt(2 * pi / static_cast<float>(std::min(count, emitter_probe_rays)));
+    std::vector<uint8_t> marks(grid_.count());
+    for (uint32_t i = 0; i < count; ++i) {
+        const Emitter& e = of_group[i % emitters];
+        const uint32_t own = i / emitters;
+        const bool back = e.double_sided && own % 2 == 1;
+        const glm::vec3 normal = back ? -e.normal : e.normal;
+        glm::vec3 t, b;
+        orthonormalBasis(normal, t, b);
+        const glm::vec3 d = cosineDirection(sequence2d(own, hash(seed, 2 * e.triangle)));
+        const glm::vec3 world = t * d.x + b * d.y + normal * d.z;
+        const glm::vec3 from = pointOn(e, sequence2d(own, hash(seed, 2 * e.triangle + 1))) + normal * lift_m;
+        // Through doors: what is behind them is lit once they open.
+        const auto hit = rays.nearest(from, world, far_m, hash(seed, i), Surfaces::Walls);
+        grid_.mark(from, world, hit ? hit->distance_m : far_m, spread, marks);
+    }
+    return marks;
+}
+
+void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>> lit) {
+    Cell& cell = cells_[index];
+    const glm::vec3 centre = grid_.centre(index);
+    const float radius_m = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
+    for (size_t begin = 0, g = 0; begin < emitters_.size(); ++g) {
         const uint32_t group = emitters_[begin].group;
         const size_t first = cell.choices.size();
         float sum = 0, brightest = 0;
@@ -81,6 +124,10 @@ void EmitterSampler::fillCell(Cell& cell, glm::vec3 centre, float radius_m) cons
             sum += weight;
         }
         begin = end;
+        if (!lit[g][index]) {
+            cell.choices.resize(first);
+            continue;
+        }
         auto keep = [&](const Choice& c) { return c.probability >= choice_share_min * sum; };
         const auto tail =
             std::stable_partition(cell.choices.begin() + static_cast<long>(first), cell.choices.end(), keep);
@@ -112,10 +159,7 @@ EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, f
     auto it = std::upper_bound(begin, end, choice, [](float v, const Choice& c) { return v < c.cumulative; });
     if (it == end) --it;
     const Emitter& e = emitters_[it->emitter];
-    // Uniform on a triangle: fold the unit square.
-    const float root = std::sqrt(on_triangle.x);
-    const glm::vec3 target = e.corner + e.edge1 * (root * (1 - on_triangle.y)) + e.edge2 * (root * on_triangle.y);
-    const glm::vec3 to_target = target - point;
+    const glm::vec3 to_target = pointOn(e, on_triangle) - point;
     const float distance2 = glm::dot(to_target, to_target);
     if (!(distance2 > 0)) return {};
     const float distance = std::sqrt(distance2);

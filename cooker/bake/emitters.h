@@ -33,8 +33,12 @@ struct EmitterSample {
     float pdf;  // per steradian; 0: nothing to see
 };
 
+// Rays that each light group's emitters send out to find the cells that they shine into.
+inline constexpr uint32_t emitter_probe_rays = 2048;
+
 // The chance of each emitter, per light group and per cell of a coarse grid: power over squared distance. Groups never
-// compete with one another, so adding a set changes nothing for the others.
+// compete with one another, so adding a set changes nothing for the others. Cells that a group does not shine into, as
+// far as a few rays tell, do not ask for it; rays that hit its emitters from there count in full, so nothing is lost.
 class EmitterSampler {
    public:
     EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups);
@@ -68,7 +72,9 @@ class EmitterSampler {
         std::vector<GroupRange> ranges;
         std::vector<Choice> choices;
     };
-    void fillCell(Cell& cell, glm::vec3 centre, float radius_m) const;
+    std::vector<uint8_t> litCells(const RayScene& rays, std::span<const Emitter> of_group) const;
+    // `lit`: per range of emitters of one group, in order, the cells that it shines into.
+    void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);
 
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;

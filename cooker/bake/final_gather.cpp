@@ -50,9 +50,12 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
                              const FinalGatherOptions& options) {
     aims_.clear();
     for (uint32_t t : terms) {
+        aim_of_term_[t] = 0;
         const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
-        if (guide != no_guide && std::ranges::find(aims_, guide, &DoorAim::guide) == aims_.end())
-            aims_.push_back(gatherer_.aimAt(from, guide));
+        if (guide == no_guide) continue;
+        const auto known = std::ranges::find(aims_, guide, &DoorAim::guide) - aims_.begin();
+        if (static_cast<size_t>(known) == aims_.size()) aims_.push_back(gatherer_.aimAt(from, guide));
+        aim_of_term_[t] = static_cast<uint16_t>(known + 1);
     }
 }
 
@@ -81,7 +84,7 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
                           .seed = options.seed,
                           .first_ray = r * rays_per_round,
                           .wanted_in_group = wanted_in_group_},
-                         &outgoing, round_, nullptr, aims_);
+                         &outgoing, round_, nullptr, {aims_, aim_of_term_});
         traced += rays_per_round + aims_.size() * aimed_rays;
         for (uint32_t t : terms) {
             State& s = state_[t];

@@ -32,6 +32,7 @@ class FinalGather {
         : gatherer_(gatherer),
           round_(gatherer.paths().termCount()),
           state_(gatherer.paths().termCount()),
+          aim_of_term_(gatherer.paths().termCount()),
           wanted_in_group_(gatherer.paths().groupCount()) {
         round_.wantNone();
     }
@@ -58,6 +59,7 @@ class FinalGather {
     std::vector<DoorAim> aims_;
     TermAccumulator<Light> round_;  // wants the terms that are not done
     std::vector<State> state_;
+    std::vector<uint16_t> aim_of_term_;  // of the terms that are asked for
     std::vector<uint32_t> wanted_in_group_;
 };
 

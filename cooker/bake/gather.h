@@ -46,7 +46,14 @@ struct Gathered {
     // irradiance falls off. Light from below the surface is left out. Adds up over contributions.
     glm::vec4 tilted_lux{0};
 
-    void add(glm::vec3 lux, glm::vec3 direction_tangent);
+    // Of light from one direction: on each tilted normal, per unit of irradiance on the surface.
+    using Weights = glm::vec4;
+    static Weights weightsOf(glm::vec3 direction_tangent);
+
+    void add(glm::vec3 lux, const Weights& weights) {
+        irradiance_lux += lux;
+        tilted_lux += luminance(lux) * weights;
+    }
     Gathered& operator+=(const Gathered& o) {
         irradiance_lux += o.irradiance_lux;
         tilted_lux += o.tilted_lux;
@@ -62,8 +69,12 @@ struct ProbeLight {
     using Intake = ProbeIntake;
     std::array<glm::vec3, 9> radiance{};
 
+    // Of light from one direction: the harmonics, once for each channel of `radiance`.
+    using Weights = std::array<float, 27>;
+    static Weights weightsOf(glm::vec3 direction);
+
     // `lux`: on a surface that faces the light.
-    void add(glm::vec3 lux, glm::vec3 direction);
+    void add(glm::vec3 lux, const Weights& weights);
     ProbeLight& operator+=(const ProbeLight& o) {
         for (size_t i = 0; i < 9; ++i) radiance[i] += o.radiance[i];
         return *this;
@@ -92,6 +103,12 @@ struct GatherOptions {
 struct DoorAim {
     uint32_t guide = 0;             // of DoorGuides
     std::vector<Guide> from_point;  // one per point of the receiver
+};
+
+// The aims of a gather, and per term the number of its own, from 1; 0: it has none.
+struct DoorAims {
+    std::span<const DoorAim> all = {};
+    std::span<const uint16_t> of_term = {};
 };
 
 // The face of points that lie on none: probes.
@@ -131,9 +148,7 @@ class Gatherer {
           paths_(paths),
           sky_(rays.scene()),
           guides_(rays),
-          models_(rays) {
-        for (uint32_t t = 0; t < paths.termCount(); ++t) guide_of_term_.push_back(guideOf(t));
-    }
+          models_(rays) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
@@ -142,7 +157,7 @@ class Gatherer {
     // others, weighted by the balance heuristic (Veach 1995).
     template <class Light>
     void gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                TermAccumulator<Light>& sum, GatherLinks* links, std::span<const DoorAim> aims = {}) const;
+                TermAccumulator<Light>& sum, GatherLinks* links, const DoorAims& aims = {}) const;
     DoorAim aimAt(const GatherFrom& from, uint32_t guide) const;
     // Of the term's one door; no_guide for the others.
     uint32_t guideOf(uint32_t term) const;
@@ -201,7 +216,7 @@ class Gatherer {
     void follow(const Ray<Light>& ray, uint32_t seed) const;
     template <class Light>
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                     TermAccumulator<Light>& sum, std::span<const DoorAim> aims, size_t aim) const;
+                     TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim) const;
     template <class Light>
     float shareOf(const Ray<Light>& ray, uint32_t term) const;
     uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
@@ -219,7 +234,6 @@ class Gatherer {
     SkySampler sky_;
     DoorGuides guides_;
     ModelReceivers models_;
-    std::vector<uint32_t> guide_of_term_;
 };
 
 }  // namespace dimmer::cook

@@ -12,8 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-// Rays are followed in steps of this share of a cell: short enough not to cut more than corners.
-constexpr float step_share = 0.5f;
 // Lights further outside of the level are no lamps of its: their rays would miss it.
 constexpr float margin_m = 20;
 
@@ -80,22 +78,12 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
         const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i), Surfaces::Walls);
         const float stop_m = hit ? hit->distance_m : far_m;
-        for (float m = 0; m < stop_m; m += step_share * grid_.cellSize())
-            markAround(light.position_m + d * m, spread * m, marks);
-        // Surfaces receive, and theirs is the light: generously around what a ray hit.
-        markAround(light.position_m + d * stop_m, std::max(0.5f * grid_.cellSize(), spread * stop_m), marks);
+        grid_.mark(light.position_m, d, stop_m, spread, marks);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)
         if (marks[c]) cells.push_back(c);
     return cells;
-}
-
-void LightGrid::markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const {
-    const glm::uvec3 low = grid_.coordinates(point - reach_m), high = grid_.coordinates(point + reach_m);
-    for (uint32_t z = low.z; z <= high.z; ++z)
-        for (uint32_t y = low.y; y <= high.y; ++y)
-            for (uint32_t x = low.x; x <= high.x; ++x) marks[grid_.index({x, y, z})] = 1;
 }
 
 std::span<const uint32_t> LightGrid::listed(glm::vec3 point) const {

@@ -37,7 +37,6 @@ class LightGrid {
 
    private:
     std::vector<uint32_t> reachedCells(const RayScene& rays, uint32_t light) const;
-    void markAround(glm::vec3 point, float reach_m, std::vector<uint8_t>& marks) const;
 
     std::vector<uint32_t> identity_;  // per light
     std::vector<uint32_t> everywhere_;

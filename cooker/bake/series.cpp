@@ -6,6 +6,8 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 
 namespace dimmer::cook {
@@ -18,6 +20,12 @@ constexpr float lingering_share = 0.01f;
 constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
+
+// After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
+// shrink evenly yet, later there is less to gain.
+constexpr uint32_t rounds_before_leap = 6;
+// Links are random, and each costs a trip to memory: asked for so many links ahead.
+constexpr size_t links_ahead = 8;
 
 // How much light of each group there is around each door: over the receivers that see it, all of the group's terms
 // together.
@@ -76,13 +84,11 @@ class Expansion {
     }
 
    private:
-    // Moves `sum` to a row. `least`, when not empty, leaves out what is fainter than that, per term.
+    // Moves `sum` to a row.
     template <class Value>
-    static void takeRow(TermAccumulator<Value>& sum, std::span<const float> least, std::vector<TermLight>& row) {
+    static void takeRow(TermAccumulator<Value>& sum, std::vector<TermLight>& row) {
         row.clear();
-        for (uint32_t t : sum.touched())
-            if (const glm::vec3 lux = irradianceOf(sum[t]); least.empty() || luminance(lux) >= least[t])
-                row.push_back({t, lux});
+        for (uint32_t t : sum.touched()) row.push_back({t, irradianceOf(sum[t])});
         sum.clear();
     }
     static glm::vec3 irradianceOf(const Gathered& light) { return light.irradiance_lux; }
@@ -126,7 +132,7 @@ class Expansion {
                 links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
                 door_links.put(i, links.through_doors);
                 doors_seen.put(i, links.doors);
-                takeRow(sum, {}, row);
+                takeRow(sum, row);
                 direct.put(i, row);
                 left_to_renderer.put(i, left_row);
                 stored.put(i, stored_row);
@@ -156,73 +162,149 @@ class Expansion {
                         const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
                         if (term != no_term) sum[term] += reflect * l.value;
                     }
-                takeRow(sum, {}, row);
+                takeRow(sum, row);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
+
+    // A row's entry as it lies in memory, added up as it is: the term's number is added along, and never read.
+    struct Sum {
+        using Four [[gnu::vector_size(16)]] = float;
+        Four entry = {0, 0, 0, 0};
+
+        void operator+=(const TermLight& l) {
+            static_assert(sizeof(TermLight) == sizeof(Four) && offsetof(TermLight, value) == sizeof(float));
+            Four other;
+            std::memcpy(&other, &l, sizeof other);
+            entry += other;
+        }
+        glm::vec3 operator*(float s) const { return glm::vec3(entry[1], entry[2], entry[3]) * s; }
+    };
 
     // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
     SparseLight follow(const SparseLight& radiance, const SparseLight& bounced) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
-            TermAccumulator<glm::vec3> sum(terms_);
+            TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
                 const uint32_t own = gatherer_.conditionOf(i);
-                for (uint32_t r = 0; r < settings_.series_rays; ++r) {
-                    const uint32_t from = links_[i * settings_.series_rays + r];
-                    if (from == no_index) continue;
-                    for (const TermLight& l : radiance.row(from))
-                        if (const uint32_t term = own == no_condition ? l.term : paths_.moved(l.term, free_path, own);
-                            term != no_term)
-                            sum[term] += lux_per_radiance * l.value;
+                for (size_t k = i * settings_.series_rays; k < (i + 1) * settings_.series_rays; ++k) {
+                    if (const size_t ahead = k + links_ahead; ahead < links_.size() && links_[ahead] != no_index)
+                        radiance.prefetch(links_[ahead]);
+                    if (links_[k] == no_index) continue;
+                    if (own == no_condition)
+                        for (const TermLight& l : radiance.row(links_[k])) sum[l.term] += l;
+                    else
+                        addMoved(radiance.row(links_[k]), free_path, own, sum);
                 }
                 for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
-                    for (const TermLight& l : radiance.row(link.receiver))
-                        if (const uint32_t term = paths_.moved(l.term, link.path, own); term != no_term)
-                            sum[term] += lux_per_radiance * l.value;
-                takeRow(sum, least_, row);
+                    addMoved(radiance.row(link.receiver), link.path, own, sum);
+                row.clear();
+                for (const uint32_t t : sum.touched())
+                    if (const glm::vec3 lux = sum[t] * lux_per_radiance; least_.empty() || luminance(lux) >= least_[t])
+                        row.push_back({t, lux});
+                sum.clear();
+                const size_t followed = row.size();
                 for (const TermLight& l : bounced.row(i))
                     if (!runs(l.term)) row.push_back(l);
-                std::ranges::sort(row, {}, &TermLight::term);
+                if (row.size() > followed) std::ranges::sort(row, {}, &TermLight::term);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
 
-    std::vector<double> fluxOfGroups(const SparseLight& light) const {
-        std::vector<double> sums(paths_.groupCount());
-        for (size_t i = 0; i < light.rows(); ++i)
-            for (const TermLight& l : light.row(i))
-                sums[paths_.terms()[l.term].group] += static_cast<double>(gatherer_.areaM2(i) * luminance(l.value));
-        return sums;
+    void addMoved(std::span<const TermLight> light, uint32_t path, uint32_t own, TermAccumulator<Sum>& sum) const {
+        for (const TermLight& l : light)
+            if (const uint32_t term = paths_.moved(l.term, path, own); term != no_term) sum[term] += l;
     }
 
-    // Running sum: each round follows the whole light once, so round n holds bounces 1 to n. Each group ends when what
-    // is still to come of its own light is little.
+    // visit(receiver, entry of `after`, what `before` has of it), in order.
+    static void forEachStep(const SparseLight& before, const SparseLight& after, size_t begin, size_t end,
+                            auto&& visit) {
+        for (size_t i = begin; i < end; ++i) {
+            const auto old = before.row(i);
+            auto at = old.begin();
+            for (const TermLight& l : after.row(i)) {
+                while (at != old.end() && at->term < l.term) ++at;
+                visit(i, l, at != old.end() && at->term == l.term ? at->value : glm::vec3(0));
+            }
+        }
+    }
+
+    // Of one light group, lm.
+    struct Flux {
+        double sum = 0, step = 0;  // bounced so far; what the last round changed, either way
+        double ratio = 1;          // of the last two steps
+        double ratio_at_leap = 0;
+    };
+
+    void measure(const SparseLight& before, std::vector<Flux>& groups) const {
+        std::vector<Flux> now(groups.size());
+        forEachStep(before, out_.bounced, 0, receivers_, [&](size_t i, const TermLight& l, glm::vec3 old) {
+            Flux& group = now[paths_.terms()[l.term].group];
+            const float area_m2 = gatherer_.areaM2(i);
+            group.sum += static_cast<double>(area_m2 * luminance(l.value));
+            group.step += static_cast<double>(area_m2 * std::abs(luminance(l.value - old)));
+        });
+        for (size_t g = 0; g < groups.size(); ++g) {
+            if (!running_[g]) continue;
+            groups[g].ratio = groups[g].step > 0 ? now[g].step / groups[g].step : 1;
+            groups[g].sum = now[g].sum;
+            groups[g].step = now[g].step;
+        }
+    }
+
+    // What is still to come adds up to the last step times q / (1 - q), when every step is q times the one before:
+    // adds that to the light of the groups that still run.
+    SparseLight leap(const SparseLight& before, const std::vector<Flux>& groups) const {
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+            std::vector<TermLight> row;
+            size_t current = begin;
+            const auto emitUpTo = [&](size_t i) {
+                for (; current < i; ++current, row.clear()) emit(std::span<const TermLight>(row));
+            };
+            forEachStep(before, out_.bounced, begin, end, [&](size_t i, const TermLight& l, glm::vec3 old) {
+                emitUpTo(i);
+                const double q = runs(l.term) ? groups[paths_.terms()[l.term].group].ratio_at_leap : 0;
+                row.push_back({l.term, glm::max(l.value + static_cast<float>(q / (1 - q)) * (l.value - old), 0.0f)});
+            });
+            emitUpTo(end);
+        });
+    }
+
+    // Running sum: each round follows the whole light once, so round n holds bounces 1 to n. Once the steps shrink
+    // evenly, the light leaps to where they lead; the rounds after that mend what the leap got wrong from place to
+    // place. Each group ends when what is still to come of its own light is little.
     void bounce() {
         progress_.stage("bounces", settings_.bounces_max);
         out_.bounced = SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
             for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
         });
         out_.bounces.assign(paths_.groupCount(), 0);
-        std::vector<double> sums(paths_.groupCount()), last(paths_.groupCount());
+        std::vector<Flux> groups(paths_.groupCount());
         for (uint32_t n = 0; n < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
-            out_.bounced = follow(outgoing(out_.bounced, false), out_.bounced);
+            const SparseLight before = std::move(out_.bounced);
+            out_.bounced = follow(outgoing(before, false), before);
             decideLeast(n);
             progress_.advance(1);
-            const std::vector<double> now = fluxOfGroups(out_.bounced);
+            measure(before, groups);
+            bool any_leaps = false;
             for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
                 if (!running_[g]) continue;
-                const double step = now[g] - sums[g], q = last[g] > 0 ? step / last[g] : 1;
-                sums[g] = now[g];
-                last[g] = step;
-                if (!(step > 0) || (q < 1 && step * q / (1 - q) < settings_.tail_max * sums[g]))
+                Flux& group = groups[g];
+                const double q = std::max(group.ratio, group.ratio_at_leap);
+                if (!(group.step > 0) || (q < 1 && group.step * q / (1 - q) < settings_.tail_max * group.sum)) {
                     running_[g] = 0;
-                else
-                    ++out_.bounces[g];
+                    continue;
+                }
+                ++out_.bounces[g];
+                if (n + 1 != rounds_before_leap || !(q < 1)) continue;
+                group.ratio_at_leap = q;
+                any_leaps = true;
             }
+            if (any_leaps) out_.bounced = leap(before, groups);
         }
         links_ = {};
         door_links_ = {};
@@ -254,8 +336,8 @@ class Expansion {
         });
         for (uint32_t t = 0; t < terms_; ++t) {
             TermReport& report = reports[t];
-            if (report.measured_over == 0) continue;
-            report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
+            if (report.measured_over > 0)
+                report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
             if (t == always_group) continue;
             const float threshold = std::min(settings_.thresholdOf(paths_.terms()[t].group), most);
             report.threshold_lux = threshold * report.mean_lux;

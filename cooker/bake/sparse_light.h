@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <cstring>
 #include <glm/glm.hpp>
 #include <span>
 #include <vector>
@@ -37,6 +38,13 @@ template <class Entry>
 class Sparse {
    public:
     std::span<const Entry> row(size_t i) const { return {entries_.data() + first_[i], first_[i + 1] - first_[i]}; }
+    // Begins to load a row that is asked for soon.
+    void prefetch(size_t i) const {
+        constexpr size_t line_bytes = 64, lines_max = 4;
+        const auto* line = reinterpret_cast<const char*>(entries_.data() + first_[i]);
+        const auto* end = reinterpret_cast<const char*>(entries_.data() + first_[i + 1]);
+        for (size_t n = 0; n < lines_max && line < end; ++n, line += line_bytes) __builtin_prefetch(line);
+    }
     size_t rows() const { return first_.size() - 1; }
     size_t entryCount() const { return entries_.size(); }
     size_t bytes() const { return first_.size() * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
@@ -107,11 +115,12 @@ bool fits(const Sparse<Entry>& light, size_t rows, size_t terms) {
     return true;
 }
 
-// One worker's dense scratch over terms, emptied in time proportional to what was touched (and a 64th of the rest).
+// One worker's dense scratch over terms, emptied in time proportional to what was touched (and an eighth of the rest).
 template <class Value>
 class TermAccumulator {
    public:
-    explicit TermAccumulator(uint32_t terms) : values_(terms), marks_((terms + 63) / 64), unwanted_(terms) {}
+    explicit TermAccumulator(uint32_t terms)
+        : values_(terms), marks_((terms + marks_per_word - 1) / marks_per_word * marks_per_word), unwanted_(terms) {}
 
     // What nobody wants need not be added up; all are wanted to begin with.
     bool wants(uint32_t term) const { return !unwanted_[term]; }
@@ -119,25 +128,30 @@ class TermAccumulator {
     void wantNone() { std::ranges::fill(unwanted_, uint8_t{1}); }
 
     Value& operator[](uint32_t term) {
-        marks_[term / 64] |= uint64_t{1} << (term % 64);
+        marks_[term] = 1;  // a byte each: bits of one word would make every term wait for the one before
         return values_[term];
     }
     // Terms touched since the last clear, ascending.
     std::span<const uint32_t> touched() {
         touched_.clear();
-        for (uint32_t word = 0; word < marks_.size(); ++word)
-            for (uint64_t bits = marks_[word]; bits != 0; bits &= bits - 1)
-                touched_.push_back(64 * word + static_cast<uint32_t>(std::countr_zero(bits)));
+        for (uint32_t first = 0; first < marks_.size(); first += marks_per_word) {
+            uint64_t word;
+            std::memcpy(&word, &marks_[first], sizeof word);
+            for (; word != 0; word &= word - 1)  // marks are 1, so that each has one bit
+                touched_.push_back(first + static_cast<uint32_t>(std::countr_zero(word)) / 8);
+        }
         return touched_;
     }
     void clear() {
         for (uint32_t t : touched()) values_[t] = Value{};
-        std::ranges::fill(marks_, uint64_t{0});
+        std::ranges::fill(marks_, uint8_t{0});
     }
 
    private:
+    static constexpr uint32_t marks_per_word = sizeof(uint64_t);
+
     std::vector<Value> values_;
-    std::vector<uint64_t> marks_;
+    std::vector<uint8_t> marks_;  // per term, and up to a whole word
     std::vector<uint8_t> unwanted_;
     std::vector<uint32_t> touched_;
 };

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
 namespace dimmer::cook {
 namespace {
@@ -14,53 +13,49 @@ namespace {
 // What rounding to 1/127 may take below 0 again, a little more of the mean takes back.
 constexpr float retreat = 0.97f;
 constexpr int retreats_max = 64;
-constexpr int start_normals = 64, starts_kept = 6, descent_steps = 12, newton_steps = 24;
+constexpr int jacobi_sweeps_max = 8, newton_steps_max = 32;
 
 // Irradiance on n as c + b.n + n.A n, A symmetric (Ramamoorthi and Hanrahan 2001, equation 12).
 struct Quadric {
-    float c;
-    glm::vec3 b;
-    glm::mat3 a;
-
-    float at(glm::vec3 n) const { return c + glm::dot(b, n) + glm::dot(n, a * n); }
+    double c;
+    std::array<double, 3> b;
+    std::array<std::array<double, 3>, 3> a;
 };
 
 Quadric quadricOf(const ProbeLight& light, int channel) {
-    const auto l = [&](size_t i) { return cosine_bands[bandOf(i)] * light.radiance[i][channel]; };
-    constexpr float y0 = 0.282094792f, y1 = 0.488602512f, y2 = 0.546274215f, y20 = 0.315391565f;
-    Quadric q{y0 * l(0) - y20 * l(6), y1 * glm::vec3(l(3), l(1), l(2)), glm::mat3(0)};
-    q.a[0] = {y2 * l(8), y2 * l(4), y2 * l(7)};
-    q.a[1] = {y2 * l(4), -y2 * l(8), y2 * l(5)};
-    q.a[2] = {y2 * l(7), y2 * l(5), 3 * y20 * l(6)};
-    return q;
+    const auto l = [&](size_t i) { return static_cast<double>(cosine_bands[bandOf(i)] * light.radiance[i][channel]); };
+    constexpr double y0 = 0.282094792, y1 = 0.488602512, y2 = 0.546274215, y20 = 0.315391565;
+    return {y0 * l(0) - y20 * l(6),
+            {y1 * l(3), y1 * l(1), y1 * l(2)},
+            {{{y2 * l(8), y2 * l(4), y2 * l(7)},
+              {y2 * l(4), -y2 * l(8), y2 * l(5)},
+              {y2 * l(7), y2 * l(5), 3 * y20 * l(6)}}}};
 }
 
-// Each step goes to the minimum of a bound from above that touches the quadric at n, so it never climbs; Newton's
-// method on the sphere does the last digits.
-float descend(const Quadric& q, glm::vec3 n, float shift) {
-    for (int step = 0; step < descent_steps; ++step) {
-        const glm::vec3 towards = shift * n - q.a * n - 0.5f * q.b;
-        const float length = glm::length(towards);
-        if (!(length > 0)) break;
-        n = towards / length;
+// Jacobi's rotation of axes p and q that makes a[p][q] 0.
+void rotate(Quadric& f, size_t p, size_t q) {
+    if (f.a[p][q] == 0) return;
+    const double theta = (f.a[q][q] - f.a[p][p]) / (2 * f.a[p][q]);
+    const double t = std::copysign(1 / (std::abs(theta) + std::sqrt(theta * theta + 1)), theta);
+    const double cosine = 1 / std::sqrt(t * t + 1), sine = t * cosine;
+    const auto turn = [&](double& at_p, double& at_q) {
+        const double old = at_p;
+        at_p = cosine * old - sine * at_q;
+        at_q = sine * old + cosine * at_q;
+    };
+    for (size_t k = 0; k < 3; ++k) turn(f.a[k][p], f.a[k][q]);
+    for (size_t k = 0; k < 3; ++k) turn(f.a[p][k], f.a[q][k]);
+    turn(f.b[p], f.b[q]);
+}
+
+// Turned into the frame of A's eigenvectors.
+void diagonalise(Quadric& f) {
+    for (int sweep = 0; sweep < jacobi_sweeps_max; ++sweep) {
+        if (f.a[0][1] == 0 && f.a[0][2] == 0 && f.a[1][2] == 0) return;
+        rotate(f, 0, 1);
+        rotate(f, 0, 2);
+        rotate(f, 1, 2);
     }
-    float least = q.at(n), damping = 0.1f * shift;
-    for (int step = 0; step < newton_steps && damping < 1e3f * shift; ++step) {
-        const glm::vec3 gradient = 2.0f * (q.a * n) + q.b;
-        const float along = glm::dot(gradient, n);
-        const glm::mat3 tangent = glm::mat3(1) - glm::outerProduct(n, n);
-        const glm::mat3 curvature = tangent * (2.0f * q.a + (damping - along) * glm::mat3(1)) * tangent;
-        const glm::vec3 next =
-            glm::normalize(n - glm::inverse(curvature + shift * glm::outerProduct(n, n)) * (gradient - along * n));
-        if (q.at(next) < least) {
-            n = next;
-            least = q.at(n);
-            damping *= 0.2f;
-        } else {  // too far, or uphill where the quadric is not convex
-            damping *= 5;
-        }
-    }
-    return least;
 }
 
 bool negativeSomewhere(const ProbeLight& light) {
@@ -87,20 +82,40 @@ ProbeRecord encodePlain(const ProbeLight& light, const ProbeEncoding& encoding) 
 
 }  // namespace
 
+// A quadratic on the unit sphere has no gap to its dual: the least of b.n + n.A n is the largest of
+// l - sum b_i^2 / (4 (a_i - l)) over l up to the least eigenvalue, in the frame of the eigenvectors, and lies where
+// n_i = b_i / (2 (l - a_i)) has length 1 (More and Sorensen 1983). 1 / length is concave in l, so that Newton's method
+// comes down to the root from above after one step.
 float leastIrradiance(const ProbeLight& light, int channel) {
-    const Quadric q = quadricOf(light, channel);
-    // At least the largest eigenvalue of A.
-    float shift = 0;
-    for (int i = 0; i < 3; ++i) shift = std::max(shift, std::abs(q.a[i].x) + std::abs(q.a[i].y) + std::abs(q.a[i].z));
-    std::array<std::pair<float, glm::vec3>, start_normals> starts;
-    for (int i = 0; i < start_normals; ++i) {
-        const auto n = uniformSphereDirection(sequence2d(static_cast<uint32_t>(i), 7));
-        starts[static_cast<size_t>(i)] = {q.at(n), n};
+    Quadric f = quadricOf(light, channel);
+    diagonalise(f);
+    const std::array<double, 3> a = {f.a[0][0], f.a[1][1], f.a[2][2]};
+    const auto lowest = static_cast<size_t>(std::ranges::min_element(a) - a.begin());
+    // Here the length is at most 1, and at least 1.
+    const double length_b = std::hypot(f.b[0], f.b[1], f.b[2]);
+    const double below = a[lowest] - length_b / 2, above = a[lowest] - std::abs(f.b[lowest]) / 2;
+    double l = below;
+    for (int step = 0; step < newton_steps_max; ++step) {
+        double squared = 0, slope = 0;  // of n, and half the slope of its square
+        for (size_t i = 0; i < 3; ++i) {
+            if (f.b[i] == 0 || !(a[i] > l)) continue;
+            const double n = f.b[i] / (2 * (a[i] - l));
+            squared += n * n;
+            slope += n * n / (a[i] - l);
+        }
+        if (!(slope > 0)) {
+            l = above;
+            break;
+        }
+        const double length = std::sqrt(squared);
+        const double next = std::clamp(l + (1 - length) * squared / slope, below, above);
+        if (std::abs(next - l) <= 1e-12 * (length_b + std::abs(l))) break;
+        l = next;
     }
-    std::ranges::partial_sort(starts, starts.begin() + starts_kept, {}, [](const auto& s) { return s.first; });
-    float least = std::numeric_limits<float>::infinity();
-    for (size_t i = 0; i < starts_kept; ++i) least = std::min(least, descend(q, starts[i].second, shift));
-    return least;
+    double least = f.c + l;
+    for (size_t i = 0; i < 3; ++i)
+        if (f.b[i] != 0 && a[i] > l) least -= f.b[i] * f.b[i] / (4 * (a[i] - l));
+    return static_cast<float>(least);
 }
 
 ProbeLight flattened(const ProbeLight& light, float share) {

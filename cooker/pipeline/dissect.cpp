@@ -207,7 +207,7 @@ struct Falloff {
     std::array<glm::vec3, tilted_count> tilted_lux{};
 
     void add(glm::vec3 lux, glm::vec3 direction, std::span<const glm::vec3> normals) {
-        light.add(lux, direction);
+        light.add(lux, Gathered::weightsOf(direction));
         for (size_t i = 0; i < normals.size(); ++i)
             tilted_lux[i] += lux * (std::max(0.0f, glm::dot(normals[i], direction)) / direction.z);
     }

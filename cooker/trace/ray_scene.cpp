@@ -126,7 +126,7 @@ namespace {
 // Collects every hit of a ray instead of the nearest.
 struct Collector {
     RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
-    LeafHits hits;
+    LeafHits& hits;
     const std::vector<uint32_t>* triangle_of;
 };
 
@@ -259,15 +259,14 @@ float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float dista
 }
 
 LeafHits RayScene::leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
-    if (!leaves_) return {};
-    Collector collector;
+    LeafHits found;
+    if (!leaves_) return found;
+    Collector collector{.context = {}, .hits = found, .triangle_of = leaves_->triangle_of};
     rtcInitIntersectContext(&collector.context);
     collector.context.filter = collect;
-    collector.triangle_of = leaves_->triangle_of;
     RTCRayHit r;
     leaves_->prepare(r, origin, direction, 0, distance_m, mask_opaque | mask_transparent);
     rtcIntersect1(leaves_->scene, &collector.context, &r);
-    LeafHits& found = collector.hits;
     std::sort(found.hits.data(), found.hits.data() + found.count, [](const Hit& a, const Hit& b) {
         return std::tie(a.distance_m, a.triangle) < std::tie(b.distance_m, b.triangle);
     });

@@ -45,7 +45,11 @@ struct Hit {
 struct LeafHits {
     static constexpr uint32_t max = 32;
     uint32_t count = 0;
-    std::array<Hit, max> hits;
+    union {  // not written before it is used: most rays meet no leaf
+        std::array<Hit, max> hits;
+    };
+
+    LeafHits() {}
 
     const Hit* begin() const { return hits.data(); }
     const Hit* end() const { return hits.data() + count; }

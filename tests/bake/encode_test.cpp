@@ -19,7 +19,7 @@ glm::dvec3 direction(double polar_deg, double azimuth_deg) {
 
 Gathered lamp(double polar_deg, double azimuth_deg, float lux) {
     Gathered light;
-    light.add(glm::vec3(lux), glm::vec3(direction(polar_deg, azimuth_deg)));
+    light.add(glm::vec3(lux), Gathered::weightsOf(glm::vec3(direction(polar_deg, azimuth_deg))));
     return light;
 }
 
@@ -29,7 +29,7 @@ Gathered overcast(float lux) {
     constexpr uint32_t rays = 1u << 16;
     for (uint32_t i = 0; i < rays; ++i)
         light.add(glm::vec3(lux / rays),
-                  cosineDirection({(static_cast<float>(i) + 0.5f) / rays, radicalInverse(2, i)}));
+                  Gathered::weightsOf(cosineDirection({(static_cast<float>(i) + 0.5f) / rays, radicalInverse(2, i)})));
     return light;
 }
 

@@ -21,7 +21,7 @@ ProbeLight lamps(uint32_t seed, uint32_t count, float even) {
     for (uint32_t i = 0; i < count; ++i) {
         const glm::vec3 color(unitFloat(hash(seed, 3 * i)), unitFloat(hash(seed, 3 * i + 1)),
                               unitFloat(hash(seed, 3 * i + 2)));
-        light.add(100.0f * color, direction(i, seed));
+        light.add(100.0f * color, ProbeLight::weightsOf(direction(i, seed)));
     }
     light.radiance[0] += even;
     return light;
@@ -36,7 +36,7 @@ float leastBySampling(const ProbeLight& light, int channel) {
 // Closed form: a lamp of 1 lux straight above gives 1/4 + cos/2 + 5/32 (3 cos^2 - 1), least at cos = -8/15.
 TEST(ProbeEncoding, TheLeastIrradianceOfALampIsKnown) {
     ProbeLight light;
-    light.add(glm::vec3(1), {0, 0, 1});
+    light.add(glm::vec3(1), ProbeLight::weightsOf({0, 0, 1}));
     const float cos = -8.0f / 15, least = 0.25f + cos / 2 + 5.0f / 32 * (3 * cos * cos - 1);
     EXPECT_NEAR(leastIrradiance(light, 0), least, 1e-5);
     EXPECT_NEAR(light.irradiance({0, 0, 1}).x, 0.25 + 0.5 + 5.0 / 16, 1e-5);
@@ -81,7 +81,7 @@ TEST(ProbeEncoding, LeavesSmoothLightAlone) {
 // Closed form: of the lamp above, mean / (mean - least).
 TEST(ProbeEncoding, ALampKeepsTheShareThatIsPositive) {
     ProbeLight light;
-    light.add(glm::vec3(1), {0, 0, 1});
+    light.add(glm::vec3(1), ProbeLight::weightsOf({0, 0, 1}));
     const float cos = -8.0f / 15, least = 0.25f + cos / 2 + 5.0f / 32 * (3 * cos * cos - 1);
     EXPECT_NEAR(positiveShare(light), 0.25f / (0.25f - least), 1e-4);
     EXPECT_NEAR(leastIrradiance(flattened(light, positiveShare(light)), 1), 0, 1e-5);
@@ -103,7 +103,7 @@ TEST(ProbeEncoding, DeringingCostsLittle) {
         double stored_error = 0, plain_error = 0, mean = 0;
         for (uint32_t seed = 1; seed <= 100; ++seed) {
             ProbeLight light;
-            for (uint32_t i = 0; i < count; ++i) light.add(glm::vec3(100), direction(i, seed));
+            for (uint32_t i = 0; i < count; ++i) light.add(glm::vec3(100), ProbeLight::weightsOf(direction(i, seed)));
             const ProbeLight stored = decodeProbe(encodeProbe(light, encoding), encoding);
             for (uint32_t i = 0; i < 200; ++i) {
                 const glm::vec3 n = direction(i, 7);
