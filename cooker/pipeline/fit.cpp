@@ -161,12 +161,17 @@ Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profi
     Remedy remedy;
     constexpr uint64_t corners = 8;  // of the grid's box, which are probes too
     const uint64_t probes = pack.probes.global.positions.size();
-    const uint64_t bytes = cost.global_grid + (profile.budget_total > 0 ? probeRecords(cost, losses) : 0);
-    uint64_t excess = gridIsOver(cost, profile) ? cost.global_grid - profile.budget_global_grid : 0;
-    if (profile.budget_total > 0 && cost.device() > profile.budget_total)
-        excess = std::max(excess, cost.device() - profile.budget_total);
-    if (excess == 0 || excess >= bytes || probes <= corners) return remedy;
-    const double left = density_margin * (1 - static_cast<double>(excess) / static_cast<double>(bytes));
+    double left = 1;
+    if (gridIsOver(cost, profile))
+        left = static_cast<double>(profile.budget_global_grid) / static_cast<double>(cost.global_grid);
+    if (profile.budget_total > 0 && cost.device() > profile.budget_total) {
+        const uint64_t excess = cost.device() - profile.budget_total;
+        const uint64_t bytes = cost.global_grid + probeRecords(cost, losses);
+        if (excess >= bytes) return remedy;
+        left = std::min(left, 1 - static_cast<double>(excess) / static_cast<double>(bytes));
+    }
+    if (left == 1 || probes <= corners) return remedy;
+    left *= density_margin;
     const auto to = static_cast<uint64_t>(left * static_cast<double>(probes));
     if (to <= corners) return remedy;
     remedy.changes.push_back(
