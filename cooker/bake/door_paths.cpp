@@ -106,16 +106,4 @@ DoorPaths::DoorPaths(const Scene& scene)
         }
 }
 
-uint32_t DoorPaths::moved(uint32_t from, uint32_t path, uint32_t own) const {
-    uint32_t behind = path_of_[from];
-    if (own != no_condition) behind = without_[behind * condition_count_ + own];
-    if (behind == no_path) return no_term;
-    return term(group_of_[from], joined_[path * paths_.size() + behind]);
-}
-
-uint32_t DoorPaths::leaving(uint32_t from, uint32_t own) const {
-    if (own == no_condition) return from;
-    return term(group_of_[from], with(path_of_[from], own));
-}
-
 }  // namespace dimmer::cook

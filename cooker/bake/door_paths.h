@@ -76,11 +76,18 @@ class DoorPaths {
     }
     // The one door that a term is about; no_door where there are none or several.
     uint32_t onlyDoor(uint32_t term) const { return only_door_[term]; }
-    // What light of `term` becomes along a ray of `path` to a receiver that is there under `own`, whose terms do not
-    // name that condition; no_term where it is not kept or cannot be.
-    uint32_t moved(uint32_t term, uint32_t path, uint32_t own) const;
-    // What light of `term` at a receiver that is there under `own` becomes as it leaves.
-    uint32_t leaving(uint32_t term, uint32_t own) const;
+    // What light of term `from` becomes along a ray of `path` to a receiver that is there under `own`, whose terms do
+    // not name that condition; no_term where it is not kept or cannot be.
+    uint32_t moved(uint32_t from, uint32_t path, uint32_t own) const {
+        uint32_t behind = path_of_[from];
+        if (own != no_condition) behind = without_[behind * condition_count_ + own];
+        if (behind == no_path) return no_term;
+        return term(group_of_[from], joined_[path * paths_.size() + behind]);
+    }
+    // What light of term `from` at a receiver that is there under `own` becomes as it leaves.
+    uint32_t leaving(uint32_t from, uint32_t own) const {
+        return own == no_condition ? from : term(group_of_[from], with(path_of_[from], own));
+    }
 
    private:
     uint32_t condition_count_ = 0, group_count_ = 1;

@@ -49,6 +49,7 @@ template <class Light>
 void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> terms,
                              const FinalGatherOptions& options) {
     aims_.clear();
+    wanted_in_aim_.clear();
     for (uint32_t t : terms) {
         aim_of_term_[t] = 0;
         const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
@@ -56,6 +57,8 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
         const auto known = std::ranges::find(aims_, guide, &DoorAim::guide) - aims_.begin();
         if (static_cast<size_t>(known) == aims_.size()) aims_.push_back(gatherer_.aimAt(from, guide));
         aim_of_term_[t] = static_cast<uint16_t>(known + 1);
+        wanted_in_aim_.resize(aims_.size());
+        ++wanted_in_aim_[static_cast<size_t>(known)];
     }
 }
 
@@ -84,8 +87,9 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
                           .seed = options.seed,
                           .first_ray = r * rays_per_round,
                           .wanted_in_group = wanted_in_group_},
-                         &outgoing, round_, nullptr, {aims_, aim_of_term_});
-        traced += rays_per_round + aims_.size() * aimed_rays;
+                         &outgoing, round_, nullptr, {aims_, aim_of_term_, wanted_in_aim_});
+        const auto idle = static_cast<size_t>(std::ranges::count(wanted_in_aim_, 0u));
+        traced += rays_per_round + (aims_.size() - idle) * aimed_rays;
         for (uint32_t t : terms) {
             State& s = state_[t];
             if (s.done) continue;
@@ -95,6 +99,7 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
                      interval <= options.noise_max * (s.mean + options.floor_lux[t]);
             if (!s.done) continue;
             want(t, false);
+            if (aim_of_term_[t] != 0) --wanted_in_aim_[aim_of_term_[t] - 1u];
             --waiting;
         }
         round_.clear();

@@ -57,7 +57,8 @@ class FinalGather {
 
     const Gatherer& gatherer_;
     std::vector<DoorAim> aims_;
-    TermAccumulator<Light> round_;  // wants the terms that are not done
+    std::vector<uint32_t> wanted_in_aim_;  // terms that are not done
+    TermAccumulator<Light> round_;         // wants the terms that are not done
     std::vector<State> state_;
     std::vector<uint16_t> aim_of_term_;  // of the terms that are asked for
     std::vector<uint32_t> wanted_in_group_;

@@ -109,7 +109,8 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         follow<Light>({from, options, outgoing, sum, links, aims, 0, i, point, origin.position_m, world, d},
                       seed + index);
     }
-    for (size_t a = 0; a < aims.all.size(); ++a) gatherAimed(from, options, outgoing, sum, aims, a);
+    for (size_t a = 0; a < aims.all.size(); ++a)
+        if (aims.wanted[a] > 0) gatherAimed(from, options, outgoing, sum, aims, a);
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
     if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
 }
@@ -244,11 +245,13 @@ void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const 
     if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
     if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
     if (!ray.outgoing) return;
-    const bool as_it_is = path == free_path && ray.from.condition == no_condition;
+    const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
+    const float alone = Light::Intake::total / static_cast<float>(ray.options.rays);
     for (const TermLight& light : ray.outgoing->row(found)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (term == no_term || !ray.sum.wants(term)) continue;
-        if (const float share = shareOf(ray, term); share > 0) ray.sum[term].add(light.value * share, ray.weights);
+        if (const float share = any_aim ? shareOf(ray, term) : alone; share > 0)
+            ray.sum[term].add(light.value * share, ray.weights);
     }
 }
 

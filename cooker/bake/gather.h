@@ -105,10 +105,12 @@ struct DoorAim {
     std::vector<Guide> from_point;  // one per point of the receiver
 };
 
-// The aims of a gather, and per term the number of its own, from 1; 0: it has none.
+// The aims of a gather; per term the number of its own, from 1, or 0 where it has none; and per aim, how many of its
+// terms the accumulator wants: where none is, no ray is aimed.
 struct DoorAims {
     std::span<const DoorAim> all = {};
     std::span<const uint16_t> of_term = {};
+    std::span<const uint32_t> wanted = {};
 };
 
 // The face of points that lie on none: probes.

@@ -47,6 +47,7 @@ class TermFit {
             number_[i] = found == rows[i].end() ? no_probe : static_cast<uint32_t>(members.size());
             if (found != rows[i].end()) members.push_back(&*found);
         }
+        if (members.empty()) return;
         std::vector<FitValue> probes;
         for (const ProbeTermLight* l : members) probes.push_back(valueOf(l->light));
         chooseSites(term);
