@@ -1,6 +1,7 @@
 #include "balls.h"
 
 #include <gpu/vk_result.h>
+#include <pack/pack_data.h>
 
 #include <glm/gtc/constants.hpp>
 
@@ -31,6 +32,20 @@ uint32_t movingProbes(const Script& script) {
     uint32_t probes = 0;
     for (const Ball& ball : script.balls) probes += (gridOf(ball).probeCount() + 7) / 8 * 8;
     return probes;
+}
+
+std::vector<Ball> ballsAtPlaces(const Pack& pack) {
+    constexpr float radius_m = 0.15f, way_m = 1.2f;
+    constexpr uint32_t frames_one_way = 50;
+    std::vector<Ball> balls;
+    if (pack.data().probes.global.empty()) return balls;
+    for (const PlacedModel& model : pack.models()) {
+        if (model.mesh_count > 0 || model.local_grid) continue;
+        const auto& rows = model.world_from_model.rows;
+        const glm::vec3 place(rows[0][3], rows[1][3], rows[2][3]), along(rows[0][0], rows[1][0], rows[2][0]);
+        balls.push_back({radius_m, place, place + way_m * along, frames_one_way});
+    }
+    return balls;
 }
 
 Expected<Balls> Balls::create(const Script& script, LightState& lights) {

@@ -1,8 +1,10 @@
-// The balls of a script: models that the runtime lights, and the spheres to draw.
+// The balls of a script and of a level: models that the runtime lights, and the spheres to draw.
 #pragma once
 
 #include "script.h"
 #include "sphere_renderer.h"
+
+#include <dimmer/pack.h>
 
 #include <vector>
 
@@ -10,6 +12,10 @@ namespace dimmer::sample {
 
 // Room that the runtime needs for them.
 uint32_t movingProbes(const Script& script);
+
+// One at each of the level's places for things that move (dimmer_dynamic on an empty node): there and back along the
+// node's X axis. None where the pack has no global grid to light them.
+std::vector<Ball> ballsAtPlaces(const Pack& pack);
 
 class Balls {
    public:

@@ -1,10 +1,13 @@
 // dimmer-sample: a small game without a player. Arguments in, exit code out; the work is in player.cpp.
+#include "balls.h"
 #include "player.h"
 
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 namespace {
@@ -88,6 +91,7 @@ Expected<Script> prepareScript(const Arguments& arguments, const Pack& pack) {
     }
     auto script = parseScript(text, arguments.script, pack);
     if (!script) return script;
+    std::ranges::copy(ballsAtPlaces(pack), std::back_inserter(script->balls));
     if (arguments.frames) script->frames = arguments.frames;
     if (!arguments.size.empty())
         if (auto done = applySize(arguments.size, *script); !done) return std::unexpected(done.error());

@@ -98,10 +98,27 @@ class Solver {
     std::vector<float> diagonal_, prior_;
 };
 
+void replaceGuesses(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<const uint8_t> guessed,
+                    std::span<FitValue> probes) {
+    std::vector<FitValue> sums(probes.size(), FitValue{});
+    std::vector<float> weights(probes.size(), 0);
+    for (size_t s = 0; s < sites.size(); ++s)
+        for (size_t k = 0; k < 4; ++k) {
+            const uint32_t i = sites[s].probes[k];
+            const float weight = sites[s].importance * sites[s].shares[k];
+            if (!guessed[i] || !(weight > 0)) continue;
+            weights[i] += weight;
+            for (size_t c = 0; c < 27; ++c) sums[i][c] += weight * targets[s][c];
+        }
+    for (size_t i = 0; i < probes.size(); ++i)
+        for (size_t c = 0; c < 27 && weights[i] > 0; ++c) probes[i][c] = sums[i][c] / weights[i];
+}
+
 }  // namespace
 
 void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes,
-               float tolerance) {
+               float tolerance, std::span<const uint8_t> guessed) {
+    if (!guessed.empty()) replaceGuesses(sites, targets, guessed, probes);
     Solver(sites, probes.size()).solve(targets, tolerance, probes);
 }
 

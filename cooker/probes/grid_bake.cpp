@@ -10,11 +10,12 @@ namespace {
 
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
+constexpr float fit_tolerance = 1e-3f;
 
-// Per position that is not another's double, ascending: the terms of its own place and of the places that it counts at;
-// with the light that was traced at its own.
+// Per position, ascending: the terms of its own place and of the places that it counts at; with the light that was
+// traced at its own.
 std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed, const Sparse<ProbeTermLight>& light) {
-    const size_t probes = placed.sources.size();
+    const size_t probes = placed.place_of.size();
     std::vector<std::vector<uint32_t>> around(probes);
     for (size_t s = 0; s < placed.sites.size(); ++s)
         for (size_t k = 0; k < 4; ++k)
@@ -22,7 +23,6 @@ std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed,
                 for (const ProbeTermLight& l : light.row(s)) around[placed.sites[s].probes[k]].push_back(l.term);
     std::vector<std::vector<ProbeTermLight>> rows(probes);
     tbb::parallel_for(size_t{0}, probes, [&](size_t i) {
-        if (placed.sources[i] != i) return;
         const auto own = light.row(placed.place_of[i]);
         rows[i].assign(own.begin(), own.end());
         std::ranges::sort(around[i]);
@@ -38,7 +38,7 @@ std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed,
 class TermFit {
    public:
     TermFit(const Placement& placed, const Sparse<ProbeTermLight>& light)
-        : placed_(placed), light_(light), number_(placed.sources.size(), no_probe) {}
+        : placed_(placed), light_(light), number_(placed.place_of.size(), no_probe) {}
 
     void fit(uint32_t term, std::vector<std::vector<ProbeTermLight>>& rows) {
         std::vector<ProbeTermLight*> members;
@@ -50,8 +50,11 @@ class TermFit {
         if (members.empty()) return;
         std::vector<FitValue> probes;
         for (const ProbeTermLight* l : members) probes.push_back(valueOf(l->light));
+        std::vector<uint8_t> guessed;
+        for (size_t i = 0; i < number_.size(); ++i)
+            if (number_[i] != no_probe) guessed.push_back(placed_.guessed[i]);
         chooseSites(term);
-        fitProbes(sites_, targets_, probes);
+        fitProbes(sites_, targets_, probes, fit_tolerance, guessed);
         for (size_t i = 0; i < members.size(); ++i)
             for (size_t k = 0; k < 27; ++k) members[i]->light.radiance[k / 3][static_cast<int>(k % 3)] = probes[i][k];
     }
@@ -123,8 +126,8 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
             TermFit(*placed, light).fit(static_cast<uint32_t>(t), rows);
             progress.advance(1);
         });
-    out.light = Sparse<ProbeTermLight>::build(placed->sources.size(), [&](size_t begin, size_t end, auto emit) {
-        for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[placed->sources[i]]));
+    out.light = Sparse<ProbeTermLight>::build(placed->place_of.size(), [&](size_t begin, size_t end, auto emit) {
+        for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[i]));
     });
     out.grid = std::move(placed->grid);
     return out;

@@ -1,20 +1,13 @@
 #include <probes/placement.h>
 
 #include <bake/sampling.h>
-#include <probes/free_space.h>
-#include <probes/grid_error.h>
 #include <probes/neighbourhood.h>
-#include <probes/tetrahedra.h>
-#include <probes/tetrahedron_walk.h>
-#include <probes/visibility.h>
-
-#include <fmt/format.h>
+#include <probes/trial_grid.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <tuple>
 #include <utility>
 
 namespace dimmer::cook {
@@ -26,13 +19,14 @@ constexpr double growth = 0.1;         // of the number of probes in a round, at
 constexpr uint32_t grow_rounds_max = 64;
 // The more sites there are to a probe, the more rounds of exchange find better ones among them.
 constexpr size_t sites_per_exchange = 3, exchange_rounds_max = 16;
-constexpr size_t exchange_part = 5;        // one in so many is exchanged
-constexpr float importance_floor = 0.05f;  // of the mean light: darker sites count no more
-// Of the mean light: errors of what is darker are as small as it. Every group counts alike here, so that faint ones ask
-// for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000; at 0.2 light leaks
-// through walls (1.7 % instead of 0.7 % in GridBake.LightStaysInItsRoom).
-constexpr float floor_of_mean = 0.03f;
-constexpr float search_tolerance = 0.01f;  // of fits on the way: errors that count are larger
+constexpr size_t exchange_part = 5;  // one in so many is exchanged
+// Where there are few probes each of them counts, and a trial costs little: some 5 ms with sixty of them. With more
+// there are fewer moves; among thousands a handful would tell nothing.
+constexpr size_t moves_max = 400, moves_times_probes = 24000, moves_min = 40;
+constexpr uint32_t draws_per_move = 3;  // some are not allowed
+constexpr size_t worst_places = 200;    // where a moving probe may be needed
+constexpr size_t idle_part = 3;         // one in so many probes, those that do least, may be called there
+constexpr float share_at_place = 0.1f;  // of a probe at a place that is near by
 
 class Placer {
    public:
@@ -41,44 +35,33 @@ class Placer {
         : settings_(settings),
           progress_(progress),
           rays_(rays),
-          states_(states),
           limit_(choice.probes_max),
           free_volume_m3_(choice.free_volume_m3),
-          places_(choice.places()),
-          first_corner_(places_.size() - choice.blocks.back().places_m.size()),
-          near_(coarse_spacing_m) {
-        auto corner = static_cast<uint32_t>(first_corner_);
-        for (const bool is_free : choice.corner_free) corners_.push_back(is_free ? corner++ : no_index);
-        is_probe_.assign(first_corner_, false);
-    }
+          trial_(rays, choice, states, settings),
+          places_(trial_.places()),
+          near_(coarse_spacing_m) {}
 
     Expected<Placement> run() {
-        decideImportance();
         settings_.uniform ? placeLattice() : placeCoarse();
         if (auto ok = build(); !ok) return std::unexpected(ok.error());
         if (!settings_.uniform) {
-            progress_.stage("probe placement", exchangeRounds() + 1);
+            progress_.stage("probe placement", exchangeRounds() + 2);
             if (auto ok = grow(); !ok) return std::unexpected(ok.error());
             if (auto ok = exchange(); !ok) return std::unexpected(ok.error());
+            if (auto ok = moveAbout(); !ok) return std::unexpected(ok.error());
         }
-        look_ = Look::Thorough;
-        seen_.clear();
-        if (auto ok = build(); !ok) return std::unexpected(ok.error());
-        // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
-        out_.sites.resize(first_corner_);
-        for (uint32_t i = 0; i < out_.grid.positions.size(); ++i) out_.place_of.push_back(siteOf(i));
-        return std::move(out_);
+        return trial_.take();
     }
 
    private:
+    Expected<void> build() { return trial_.build(probes_); }
+
     // Adds probes until they are as many as may be, or nothing is wrong.
     Expected<void> grow() {
-        for (uint32_t round = 0; round < grow_rounds_max && probes_.size() < limit_; ++round) {
-            findErrors();
+        for (uint32_t round = 0; round < grow_rounds_max && probes_.places.size() < limit_; ++round) {
             if (!refine()) break;
             if (auto ok = build(); !ok) return ok;
         }
-        findErrors();
         progress_.advance(1);
         return {};
     }
@@ -86,96 +69,123 @@ class Placer {
     // Again and again, a fifth of the probes that do least go, and others come where they are needed more; the best
     // set that was seen stays.
     Expected<void> exchange() {
-        auto best = std::pair(probes_, levels_);
-        double least = meanError();
+        ChosenProbes best = probes_;
+        double least = trial_.meanError();
         for (size_t round = 0; round < exchangeRounds(); ++round) {
             thinOut();
             if (auto ok = build(); !ok) return ok;
             if (auto ok = grow(); !ok) return ok;
-            if (!(meanError() < least)) continue;
-            least = meanError();
-            best = {probes_, levels_};
+            if (!(trial_.meanError() < least)) continue;
+            least = trial_.meanError();
+            best = probes_;
         }
-        std::tie(probes_, levels_) = best;
+        take(std::move(best));
+        return build();
+    }
+
+    size_t exchangeRounds() const {
+        return std::min(exchange_rounds_max, trial_.placeCount() / limit_ / sites_per_exchange);
+    }
+
+    // Those that do least go, but for those that are the only ones in sight of somewhere.
+    void thinOut() {
+        const std::vector<uint32_t> order = leastUsefulFirst();
+        const auto leave = order.begin() + static_cast<std::ptrdiff_t>(order.size() / exchange_part);
+        Neighbourhood staying(coarse_spacing_m);
+        for (auto i = leave; i != order.end(); ++i) staying.add(places_[probes_.places[*i]]);
+        std::vector<uint32_t> kept(leave, order.end());
+        for (auto i = leave; i != order.begin();) {
+            const glm::vec3 p = places_[probes_.places[*--i]];
+            if (staying.anySeen(rays_, p, coarse_spacing_m)) continue;
+            staying.add(p);
+            kept.push_back(*i);
+        }
+        std::ranges::sort(kept);
+        ChosenProbes remaining;
+        for (const uint32_t i : kept) {
+            remaining.places.push_back(probes_.places[i]);
+            remaining.levels.push_back(probes_.levels[i]);
+        }
+        take(std::move(remaining));
+    }
+
+    std::vector<uint32_t> leastUsefulFirst() const {
+        const std::vector<float> useful = trial_.usefulness();
+        std::vector<uint32_t> order(useful.size());
+        std::iota(order.begin(), order.end(), 0u);
+        std::ranges::stable_sort(order, {}, [&](uint32_t i) { return useful[i]; });
+        return order;
+    }
+
+    void take(ChosenProbes probes) {
+        probes_ = std::move(probes);
+        near_ = Neighbourhood(coarse_spacing_m);
+        for (const uint32_t i : probes_.places) near_.add(places_[i]);
+    }
+
+    // Single probes move, by turns to places near by and to where they are needed more; what helps stays.
+    Expected<void> moveAbout() {
+        double least = trial_.meanError();
+        const size_t moves = movesToTry();
+        size_t tried = 0;
+        for (uint32_t move = 0; move < draws_per_move * moves && tried < moves && anythingWrong(); ++move) {
+            const ChosenProbes before = probes_;
+            if (!(move % 2 == 0 ? moveNearby(move) : moveWhereNeeded(move))) continue;
+            ++tried;
+            TrialGrid::Result result = trial_.result();
+            if (auto ok = build(); !ok) return ok;
+            if (trial_.meanError() < least) {
+                least = trial_.meanError();
+            } else {
+                probes_ = before;
+                trial_.restore(before, std::move(result));
+            }
+        }
+        progress_.advance(1);
         return {};
     }
 
-    size_t exchangeRounds() const { return std::min(exchange_rounds_max, first_corner_ / limit_ / sites_per_exchange); }
-
-    double meanError() const {
-        double sum = 0;
-        for (const float e : error_) sum += static_cast<double>(e);
-        return sum / static_cast<double>(error_.size());
+    size_t movesToTry() const {
+        const size_t moves = std::min(moves_max, moves_times_probes / std::max<size_t>(probes_.places.size(), 1));
+        return moves < moves_min ? 0 : moves;
     }
 
-    // How wrong a probe's place would be without it, by what its neighbours in sight have, times what it stands for.
-    std::vector<float> usefulness() const {
-        const size_t count = probes_.size();
-        std::vector<FitValue> around(count, FitValue{});
-        std::vector<float> weight(count, 0), useful(count, 0), shares(count, 0);
-        for (const auto& [a, b] : edges()) {
-            const glm::vec3 p = places_[probes_[a]], q = places_[probes_[b]];
-            if (rays_.blocked(p, q)) continue;
-            const float near = 1 / glm::dot(p - q, p - q);
-            for (const auto& [to, from] : {std::pair(a, b), std::pair(b, a)}) {
-                weight[to] += near;
-                for (size_t c = 0; c < 27; ++c) around[to][c] += near * states_[probes_[from]][c];
-            }
-        }
-        for (const FitSite& s : out_.sites)
+    bool anythingWrong() const { return std::ranges::max(trial_.result().errors) > settings_.tolerance; }
+
+    bool moveNearby(uint32_t move) {
+        const uint32_t probe = hash(move, 1) % static_cast<uint32_t>(probes_.places.size());
+        std::vector<uint32_t> candidates;
+        for (uint32_t i = 0; i < trial_.placeCount(); ++i) {
+            const FitSite& site = trial_.result().placement.sites[i];
             for (size_t k = 0; k < 4; ++k)
-                if (s.probes[k] < count) shares[s.probes[k]] += s.shares[k];
-        for (size_t i = 0; i < count; ++i) {
-            for (float& v : around[i]) v /= std::max(weight[i], 1e-12f);
-            useful[i] = shares[i] * errorOf(around[i], states_[probes_[i]]);
+                if (site.probes[k] == probe && site.shares[k] > share_at_place) candidates.push_back(i);
         }
-        return useful;
+        return !candidates.empty() && moveTo(probe, candidates[hash(move, 2) % candidates.size()]);
     }
 
-    // Of the tetrahedra, between probes; each once, ascending.
-    std::vector<std::pair<uint32_t, uint32_t>> edges() const {
-        std::vector<std::pair<uint32_t, uint32_t>> list;
-        for (const Tetrahedron& t : out_.grid.tetrahedra)
-            for (const uint32_t a : t.probes)
-                for (const uint32_t b : t.probes)
-                    if (a < b && b < probes_.size()) list.emplace_back(a, b);
-        std::ranges::sort(list);
-        list.erase(std::unique(list.begin(), list.end()), list.end());
-        return list;
+    bool moveWhereNeeded(uint32_t move) {
+        const auto order = leastUsefulFirst();
+        const uint32_t probe = order[hash(move, 1) % (order.size() / idle_part + 1)];
+        const auto& errors = trial_.result().errors;
+        std::vector<uint32_t> worst(trial_.placeCount());
+        std::iota(worst.begin(), worst.end(), 0u);
+        const size_t count = std::min(worst_places, worst.size());
+        std::ranges::partial_sort(worst, worst.begin() + static_cast<std::ptrdiff_t>(count), {},
+                                  [&](uint32_t i) { return std::pair(-errors[i], i); });
+        return moveTo(probe, worst[hash(move, 2) % count]);
     }
 
-    void thinOut() {
-        const std::vector<float> useful = usefulness();
-        std::vector<uint32_t> order(probes_.size());
-        std::iota(order.begin(), order.end(), 0u);
-        std::ranges::stable_sort(order, {}, [&](uint32_t i) { return useful[i]; });
-        order.erase(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(order.size() / exchange_part));
-        std::ranges::sort(order);
-        const auto probes = std::exchange(probes_, {});
-        const auto levels = std::exchange(levels_, {});
-        near_ = Neighbourhood(coarse_spacing_m);
-        is_probe_.assign(first_corner_, false);
-        for (const uint32_t i : order) {
-            near_.add(places_[probes[i]]);
-            is_probe_[probes[i]] = true;
-            probes_.push_back(probes[i]);
-            levels_.push_back(levels[i]);
-        }
-    }
-
-    // Between absolute errors and shares of the light that is there: least squares of shares would have lamps' light
-    // too dark, as too bright costs more.
-    void decideImportance() {
-        // From the first coefficient to the mean irradiance: sqrt(pi) / 2.
-        const float to_lux = std::sqrt(pi) / 2;
-        double sum = 0;
-        for (size_t i = 0; i < first_corner_; ++i) sum += static_cast<double>(to_lux * states_[i][0]);
-        const auto mean = static_cast<float>(sum / static_cast<double>(first_corner_));
-        floor_lux_ = std::max(mean * floor_of_mean, 1e-12f);
-        for (const FitValue& state : states_) {
-            const float lux = to_lux * state[0] + importance_floor * mean + 1e-12f;
-            importance_.push_back(1 / lux);
-        }
+    // Not so near to another one that they see, and not where that leaves somewhere without any in sight.
+    bool moveTo(uint32_t probe, uint32_t place) {
+        Neighbourhood others(coarse_spacing_m);
+        for (uint32_t i = 0; i < probes_.places.size(); ++i)
+            if (i != probe) others.add(places_[probes_.places[i]]);
+        const glm::vec3 to = places_[place], from = places_[probes_.places[probe]];
+        if (others.anySeen(rays_, to, spacingAt(to))) return false;
+        others.add(to);
+        if (!others.anySeen(rays_, from, coarse_spacing_m)) return false;
+        probes_.places[probe] = place;
+        return true;
     }
 
     float spacingAt(glm::vec3 p) const {
@@ -184,18 +194,17 @@ class Placer {
         return settings_.min_spacing_m * (play ? 1 : sparse_spacing);
     }
 
-    bool add(uint32_t site, float spacing_m) {
-        const glm::vec3 p = places_[site];
+    bool add(uint32_t place, float spacing_m) {
+        const glm::vec3 p = places_[place];
         if (near_.anySeen(rays_, p, spacing_m)) return false;
         near_.add(p);
-        is_probe_[site] = true;
-        probes_.push_back(site);
-        levels_.push_back(static_cast<uint8_t>(level_));
+        probes_.places.push_back(place);
+        probes_.levels.push_back(static_cast<uint8_t>(level_));
         return true;
     }
 
     void placeCoarse() {
-        for (uint32_t i = 0; i < first_corner_ && probes_.size() < limit_; ++i) add(i, coarse_spacing_m);
+        for (uint32_t i = 0; i < trial_.placeCount() && probes_.places.size() < limit_; ++i) add(i, coarse_spacing_m);
     }
 
     // The sites nearest to the points of a lattice, as many points as probes may be: as even as sites are.
@@ -208,7 +217,7 @@ class Placer {
 
     std::vector<uint32_t> latticeSites(double spacing_m) const {
         std::map<std::array<int, 3>, std::pair<float, uint32_t>> nearest;
-        for (uint32_t i = 0; i < first_corner_; ++i) {
+        for (uint32_t i = 0; i < trial_.placeCount(); ++i) {
             const glm::dvec3 cell = glm::dvec3(places_[i]) / spacing_m;
             const auto distance = static_cast<float>(glm::distance(cell, glm::floor(cell) + 0.5));
             const glm::ivec3 c(glm::floor(cell));
@@ -220,160 +229,47 @@ class Placer {
         return sites;
     }
 
-    Expected<void> build() {
-        std::vector<glm::vec3> points;
-        for (const uint32_t i : probes_) points.push_back(places_[i]);
-        auto grid = tetrahedralise(points, {rays_.boundsMin(), rays_.boundsMax()});
-        if (!grid) return std::unexpected(grid.error());
-        out_.grid = std::move(*grid);
-        std::ranges::copy(levels_, out_.grid.levels.begin());
-        findSources();
-        if (settings_.visibility) findVisibility();
-        locateSites();
-        return {};
-    }
-
-    // The site that a position is; no_index: a corner that is not free.
-    uint32_t siteOf(uint32_t position) const {
-        return position < probes_.size() ? probes_[position] : corners_[position - probes_.size()];
-    }
-    bool isFree(uint32_t position) const { return siteOf(position) != no_index; }
-
-    void findSources() {
-        const auto count = static_cast<uint32_t>(out_.grid.positions.size());
-        out_.sources.resize(count);
-        for (uint32_t i = 0; i < count; ++i) {
-            out_.sources[i] = i;
-            float nearest = std::numeric_limits<float>::infinity();
-            for (uint32_t k = 0; k < count && !isFree(i); ++k) {
-                if (!isFree(k)) continue;
-                const float distance = glm::distance(vec(out_.grid.positions[i]), places_[siteOf(k)]);
-                if (distance < nearest) nearest = distance, out_.sources[i] = k;
-            }
-        }
-    }
-
-    void locateSites() {
-        out_.sites.resize(places_.size());
-        place_.resize(places_.size());
-        tbb::parallel_for(size_t{0}, places_.size(), [&](size_t i) {
-            const glm::vec3 p = places_[i];
-            const GridPlace place = locate(out_.grid, {p.x, p.y, p.z});
-            FitSite& site = out_.sites[i];
-            site.shares = probeWeights(out_.grid, place);
-            site.importance = importance_[i];
-            for (size_t k = 0; k < 4; ++k)
-                site.probes[k] = out_.sources[out_.grid.tetrahedra[place.tetrahedron].probes[k]];
-            place_[i] = place.tetrahedron;
-        });
-    }
-
-    // Tetrahedra of earlier rounds keep what was found: by the sites that their probes are, and the corners.
-    using Key = std::array<uint32_t, 4>;
-    Key keyOf(const Tetrahedron& t) const {
-        const auto name = [&](uint32_t position) {
-            return position < probes_.size() ? probes_[position]
-                                             : static_cast<uint32_t>(places_.size() + position - probes_.size());
-        };
-        return {name(t.probes[0]), name(t.probes[1]), name(t.probes[2]), name(t.probes[3])};
-    }
-
-    void findVisibility() {
-        GlobalGrid& grid = out_.grid;
-        grid.visibility.resize(grid.tetrahedra.size());
-        std::vector<uint32_t> fresh;
-        for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) {
-            const auto found = seen_.find(keyOf(grid.tetrahedra[t]));
-            if (found != seen_.end())
-                grid.visibility[t] = found->second;
-            else
-                fresh.push_back(t);
-        }
-        tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
-            const Tetrahedron& t = grid.tetrahedra[fresh[i]];
-            std::array<glm::vec3, 4> corners;
-            std::array<bool, 4> free;
-            for (size_t k = 0; k < 4; ++k) {
-                corners[k] = vec(grid.positions[t.probes[k]]);
-                free[k] = isFree(t.probes[k]);
-            }
-            grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, look_);
-        });
-        for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
-    }
-
-    float errorOf(const FitValue& light, const FitValue& traced) const {
-        float sum = 0;
-        for (size_t state = 0; state < site_states; ++state)
-            sum += gridError(&light[9 * state], &traced[9 * state], floor_lux_);
-        return sum / site_states;
-    }
-
-    // With the light that probes would be given.
-    void findErrors() {
-        std::vector<FitValue> probes;
-        for (uint32_t i = 0; i < out_.grid.positions.size(); ++i) probes.push_back(states_[siteOf(out_.sources[i])]);
-        fitProbes(std::span(out_.sites).first(first_corner_), states_.first(first_corner_), probes, search_tolerance);
-        error_.resize(first_corner_);
-        tbb::parallel_for(size_t{0}, first_corner_, [&](size_t i) {
-            const FitSite& site = out_.sites[i];
-            FitValue light{};
-            for (size_t k = 0; k < 4; ++k)
-                for (size_t c = 0; c < light.size(); ++c) light[c] += site.shares[k] * probes[site.probes[k]][c];
-            error_[i] = is_probe_[i] ? 0 : errorOf(light, states_[i]);
-        });
-    }
-
     // The worst site of the worst tetrahedra. False when nothing is left to do.
     bool refine() {
         struct Cell {
             float sum = 0;
             std::vector<uint32_t> sites;
         };
+        const auto& [placement, at, errors] = trial_.result();
         std::map<uint32_t, Cell> cells;
-        for (uint32_t i = 0; i < first_corner_; ++i)
-            if (error_[i] > settings_.tolerance) {
-                cells[place_[i]].sum += error_[i];
-                cells[place_[i]].sites.push_back(i);
+        for (uint32_t i = 0; i < trial_.placeCount(); ++i)
+            if (errors[i] > settings_.tolerance) {
+                Cell& cell = cells[at[i].tetrahedron];
+                cell.sum += errors[i];
+                cell.sites.push_back(i);
             }
         std::vector<Cell*> order;
         for (auto& [t, cell] : cells) order.push_back(&cell);
         std::ranges::stable_sort(order, [](const Cell* a, const Cell* b) { return a->sum > b->sum; });
-        const size_t before = probes_.size();
+        const size_t before = probes_.places.size();
         const size_t most =
             std::min(limit_, before + std::max<size_t>(8, static_cast<size_t>(growth * static_cast<double>(before))));
         ++level_;
         for (Cell* cell : order) {
-            std::ranges::stable_sort(cell->sites, [&](uint32_t a, uint32_t b) { return error_[a] > error_[b]; });
+            std::ranges::stable_sort(cell->sites, {}, [&](uint32_t i) { return -errors[i]; });
             for (const uint32_t i : cell->sites) {
-                if (probes_.size() >= most) return true;
+                if (probes_.places.size() >= most) return true;
                 if (add(i, spacingAt(places_[i]))) break;
             }
         }
-        return probes_.size() > before;
+        return probes_.places.size() > before;
     }
 
     const GridSettings& settings_;
     Progress& progress_;
     const RayScene& rays_;
-    std::span<const FitValue> states_;  // per place
-    size_t limit_;                      // of probes
+    size_t limit_;  // of probes
     double free_volume_m3_;
-    std::vector<glm::vec3> places_;  // sites, and behind them the free corners of the box
-    size_t first_corner_;
-    std::vector<uint32_t> corners_;  // per corner: its place, or no_index
-    Placement out_;
-    float floor_lux_ = 0;
+    TrialGrid trial_;
+    const std::vector<glm::vec3>& places_;
     uint32_t level_ = 0;
-    std::vector<float> importance_;  // per site
-    std::vector<bool> is_probe_;     // per site but corners
-    std::vector<uint32_t> probes_;   // sites
-    std::vector<uint8_t> levels_;    // of probes_
-    Neighbourhood near_;
-    Look look_ = Look::Hasty;
-    std::map<Key, TetrahedronVisibility> seen_;
-    std::vector<uint32_t> place_;  // per site: its tetrahedron
-    std::vector<float> error_;     // per site but corners
+    ChosenProbes probes_;
+    Neighbourhood near_;  // of probes_
 };
 
 }  // namespace

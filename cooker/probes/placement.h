@@ -9,12 +9,11 @@ namespace dimmer::cook {
 
 struct Placement {
     GlobalGrid grid;  // with visibility and levels; empty where nothing is free
-    // Per position: the place of SiteChoice that it is; no_index for corners of the box that are not free.
+    // Per position: the place of SiteChoice whose light it starts from: its own; for corners of the box that lie in
+    // geometry or outside of the level, that of the nearest probe.
     std::vector<uint32_t> place_of;
-    // Per position, the one whose light it has: its own; for corners of the box that lie in geometry or outside of the
-    // level, the nearest that is free.
-    std::vector<uint32_t> sources;
-    // The places where light was traced, probes included, without corners; shares are of `sources`.
+    std::vector<uint8_t> guessed;  // per position: whether it is such a corner
+    // The places where light was traced, probes included, without corners.
     std::vector<FitSite> sites;
 };
 

@@ -9,7 +9,13 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t samples_max = 32;
+constexpr uint32_t samples = 32;
+constexpr size_t places_max = 32;
+// Rows that sort points alike differ in what of the geometry between they take for seen: the face of the wall that is
+// nearer to the probe has less, and hides what no point happened to stand at.
+constexpr uint32_t draw_scale = 1024;
+constexpr uint32_t tries_per_sample = 3;
+constexpr float same_plane_m = 1e-4f;
 constexpr uint32_t leak_cost = 3, miss_cost = 1;
 constexpr uint32_t lonely_miss_cost = 8;  // of a point that no other probe is taken to see
 constexpr std::array<int8_t, 4> seen_everywhere = {127, 127, 127, 127};
@@ -35,15 +41,6 @@ float value(const Weights& field, const Weights& at) {
     return field[0] * at[0] + field[1] * at[1] + field[2] * at[2] + field[3] * at[3];
 }
 
-// Signed distances of the corners, positive on the probe's side.
-Weights distances(const Plane& plane, const std::array<glm::vec3, 4>& corners, size_t probe) {
-    Weights out;
-    for (size_t i = 0; i < 4; ++i) out[i] = glm::dot(plane.normal, corners[i] - plane.point);
-    if (out[probe] < 0)
-        for (float& d : out) d = -d;
-    return out;
-}
-
 std::array<int8_t, 4> quantised(const Weights& field) {
     float largest = 0;
     for (const float f : field) largest = std::max(largest, std::abs(f));
@@ -59,19 +56,42 @@ float value(const std::array<int8_t, 4>& row, const Weights& at) {
                  at);
 }
 
+// Towards the corners and between them, where a wall can part what few points all over would miss.
+constexpr uint32_t corner_samples = 10;
+constexpr float corner_share = 0.94f, edge_share = 0.47f, other_share = 0.02f, off_edge_share = 0.03f;
+
+std::array<Weights, corner_samples> pointsAtCorners() {
+    std::array<Weights, corner_samples> points;
+    size_t n = 0;
+    for (size_t a = 0; a < 4; ++a) {
+        points[n].fill(other_share);
+        points[n++][a] = corner_share;
+        for (size_t b = 0; b < a; ++b) {
+            points[n].fill(off_edge_share);
+            points[n][a] = points[n][b] = edge_share;
+            ++n;
+        }
+    }
+    return points;
+}
+
 class Table {
    public:
     Table(const RayScene& rays, const std::array<glm::vec3, 4>& corners, const std::array<bool, 4>& free,
-          uint32_t samples)
-        : rays_(rays), corners_(corners), samples_(samples) {
-        for (uint32_t i = 0; i < samples_; ++i) points_[i] = pointInside(sequence3d(i, 1));
-        for (size_t v = 0; v < 4; ++v)
-            if (free[v]) look(v);
+          std::span<const std::array<float, 4>> places)
+        : rays_(rays), corners_(corners) {
+        for (size_t v = 0; v < 4; ++v) free_[v] = free[v];
+        for (const Weights& w : pointsAtCorners()) look(w);
+        for (uint32_t i = 0; i < tries_per_sample * samples && points_.size() < corner_samples + samples; ++i)
+            look(pointInside(sequence3d(i, 1)));
+        const size_t step = places.size() / places_max + 1;
+        for (size_t i = 0; i < places.size(); i += step) look(places[i]);
     }
 
     TetrahedronVisibility find() {
         TetrahedronVisibility out;
-        for (auto& costs : miss_) costs.fill(miss_cost);
+        lendUnseen();
+        findRows();
         for (size_t v = 0; v < 4; ++v) out.seen[v] = bestRow(v);
         if (!markLonely(out)) return out;
         for (size_t v = 0; v < 4; ++v) out.seen[v] = bestRow(v);
@@ -79,26 +99,94 @@ class Table {
     }
 
    private:
-    void look(size_t v) {
-        for (uint32_t i = 0; i < samples_; ++i) {
-            const Weights& w = points_[i];
-            const glm::vec3 to = w[0] * corners_[0] + w[1] * corners_[1] + w[2] * corners_[2] + w[3] * corners_[3];
-            const float distance = glm::distance(to, corners_[v]);
-            const auto hit = rays_.nearest(corners_[v], (to - corners_[v]) / distance, distance, i);
-            seen_[v][i] = !hit;
+    struct Point {
+        Weights at;
+        std::array<bool, 4> seen = {};
+        std::array<uint32_t, 4> miss = {miss_cost, miss_cost, miss_cost, miss_cost};
+        std::array<uint32_t, 4> plane = {};  // that hides it from each probe
+    };
+
+    // From the point to the probes. Where none is seen, but backs are, the point lies in geometry or outside of the
+    // level, and nobody will ask for it.
+    void look(const Weights& w) {
+        Point point{w};
+        const glm::vec3 from = w[0] * corners_[0] + w[1] * corners_[1] + w[2] * corners_[2] + w[3] * corners_[3];
+        uint32_t hidden = 0, backs = 0;
+        for (size_t v = 0; v < 4; ++v) {
+            if (!free_[v]) continue;
+            const float distance = glm::distance(from, corners_[v]);
+            point.seen[v] = true;
+            if (!(distance > 0)) continue;
+            const auto hit = rays_.nearest(from, (corners_[v] - from) / distance, distance, v);
             if (!hit) continue;
-            const Plane plane{rays_.pointOn(hit->triangle, hit->u, hit->v), rays_.triangles()[hit->triangle].normal};
-            const Weights field = distances(plane, corners_, v);
-            if (field[v] > 0) rows_[v].push_back(quantised(field));
+            point.seen[v] = false;
+            ++hidden;
+            backs += hit->back && !rays_.scene().materials[rays_.triangles()[hit->triangle].material].double_sided;
+            point.plane[v] = numberOf(hit->triangle, rays_.pointOn(hit->triangle, hit->u, hit->v));
+            if (const auto near = rays_.nearest(corners_[v], (from - corners_[v]) / distance, distance, v))
+                numberOf(near->triangle, rays_.pointOn(near->triangle, near->u, near->v));
         }
+        const bool open = 2 * backs <= hidden || point.seen != std::array<bool, 4>{};
+        (open ? points_ : buried_).push_back(point);
+    }
+
+    // 1 and up, of planes_.
+    uint32_t numberOf(uint32_t triangle, glm::vec3 on) {
+        const Plane plane{on, rays_.triangles()[triangle].normal};
+        const Weights field = fieldOf(plane);
+        const auto same = [&](const Weights& other) {
+            for (size_t k = 0; k < 4; ++k)
+                if (std::abs(other[k] - field[k]) > same_plane_m) return false;
+            return true;
+        };
+        for (uint32_t i = 0; i < planes_.size(); ++i)
+            if (same(planes_[i])) return i + 1;
+        planes_.push_back(field);
+        return static_cast<uint32_t>(planes_.size());
+    }
+
+    // Signed distances of the corners.
+    Weights fieldOf(const Plane& plane) const {
+        Weights out;
+        for (size_t i = 0; i < 4; ++i) out[i] = glm::dot(plane.normal, corners_[i] - plane.point);
+        return out;
+    }
+
+    // Points that no probe sees belong to those that stand on their side of most of what hides them from others: the
+    // light there is more like theirs than like that behind the wall. Corners of the box that see nothing, too.
+    void lendUnseen() {
+        for (Point& point : points_) {
+            if (point.seen != std::array<bool, 4>{}) continue;
+            std::array<uint32_t, 4> same_side{};
+            for (size_t v = 0; v < 4; ++v) {
+                if (point.plane[v] == 0) continue;
+                const Weights& field = planes_[point.plane[v] - 1];
+                const bool beyond = value(field, point.at) > 0;
+                for (size_t u = 0; u < 4; ++u) same_side[u] += (field[u] > 0) == beyond;
+            }
+            const uint32_t most = std::ranges::max(same_side);
+            for (size_t u = 0; u < 4; ++u) point.seen[u] = most > 0 && same_side[u] == most;
+        }
+    }
+
+    // Each plane, positive on the probe's side.
+    void findRows() {
+        for (size_t v = 0; v < 4; ++v)
+            for (Weights field : planes_) {
+                if (field[v] < 0)
+                    for (float& d : field) d = -d;
+                if (field[v] > 0) rows_[v].push_back(quantised(field));
+            }
     }
 
     uint32_t cost(size_t v, const std::array<int8_t, 4>& row) const {
         uint32_t sum = 0;
-        for (uint32_t i = 0; i < samples_; ++i) {
-            const bool taken_for_seen = value(row, points_[i]) > 0;
-            if (taken_for_seen != seen_[v][i]) sum += taken_for_seen ? leak_cost : miss_[v][i];
+        for (const Point& point : points_) {
+            const bool taken_for_seen = value(row, point.at) > 0;
+            if (taken_for_seen != point.seen[v]) sum += taken_for_seen ? leak_cost : point.miss[v];
         }
+        sum *= draw_scale;
+        for (const Point& point : buried_) sum += value(row, point.at) > 0;
         return sum;
     }
 
@@ -118,12 +206,12 @@ class Table {
     // Points that some probe sees and none is taken to see count more from now on.
     bool markLonely(const TetrahedronVisibility& table) {
         bool any = false;
-        for (uint32_t i = 0; i < samples_; ++i) {
+        for (Point& point : points_) {
             bool taken = false;
-            for (size_t v = 0; v < 4; ++v) taken = taken || value(table.seen[v], points_[i]) > 0;
+            for (size_t v = 0; v < 4; ++v) taken = taken || value(table.seen[v], point.at) > 0;
             for (size_t v = 0; v < 4 && !taken; ++v)
-                if (seen_[v][i]) {
-                    miss_[v][i] = lonely_miss_cost;
+                if (point.seen[v]) {
+                    point.miss[v] = lonely_miss_cost;
                     any = true;
                 }
         }
@@ -132,18 +220,17 @@ class Table {
 
     const RayScene& rays_;
     const std::array<glm::vec3, 4>& corners_;
-    uint32_t samples_;
-    std::array<Weights, samples_max> points_;
-    std::array<std::array<bool, samples_max>, 4> seen_{};
-    std::array<std::array<uint32_t, samples_max>, 4> miss_{};
-    std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;  // planes that stopped rays
+    std::array<bool, 4> free_;
+    std::vector<Point> points_, buried_;
+    std::vector<Weights> planes_;  // that stopped rays
+    std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;
 };
 
 }  // namespace
 
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
-                                     const std::array<bool, 4>& free, Look look) {
-    return Table(rays, corners, free, look == Look::Hasty ? samples_max / 2 : samples_max).find();
+                                     const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places) {
+    return Table(rays, corners, free, places).find();
 }
 
 }  // namespace dimmer::cook

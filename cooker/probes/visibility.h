@@ -7,17 +7,16 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <span>
 
 namespace dimmer::cook {
-
-// Hasty: with half of the rays, while it is not known which tetrahedra stay.
-enum class Look { Thorough, Hasty };
 
 // Rays go from each probe to points all over the tetrahedron; of the planes of the surfaces that stop them, the one
 // that parts seen from hidden best is stored. A hidden point taken for seen counts more than the other way round, as
 // light through a wall shows more than one probe less, but a point that one probe alone sees is not left to none.
 // Doors' leaves stop rays where they stand closed. `free`: probes that do not stand in the open see nothing.
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
-                                     const std::array<bool, 4>& free, Look look = Look::Thorough);
+                                     const std::array<bool, 4>& free,
+                                     std::span<const std::array<float, 4>> places = {});
 
 }  // namespace dimmer::cook

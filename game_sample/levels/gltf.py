@@ -59,10 +59,10 @@ class Gltf:
         placement = {"translation": list(origin)} if any(origin) else {}
         self.node(name, extras, mesh=len(self.meshes) - 1, **placement)
 
-    def write(self, path, bin_path, node_extras=lambda node: {}):
-        """`node_extras` gives what a variant of the level adds to a node's extras."""
+    def write(self, path, bin_path, node_extras=lambda node: {}, more_nodes=()):
+        """`node_extras` gives what a variant of the level adds to a node's extras, `more_nodes` what it has besides."""
         nodes = []
-        for node in self.nodes:
+        for node in [*self.nodes, *more_nodes]:
             extras = {**node.get("extras", {}), **node_extras(node)}
             nodes.append({**node, "extras": extras} if extras else node)
         document = {

@@ -3,8 +3,8 @@
 
     python3 make_house.py [FOLDER]
 
-makes house.gltf (direct light of lamps is left to the renderer, as in a game) and house_full.gltf (baked too), with
-their geometry in house.bin. Metres; x east, y up, z south; the ground floor is y = 0. Python's standard
+makes house.gltf (direct light of lamps is left to the renderer, as in a game) and house_full.gltf, the demo's (baked
+too, with furniture that light grids light and more places for things that move), with their geometry in house.bin. Metres; x east, y up, z south; the ground floor is y = 0. Python's standard
 library only; the same bytes every time.
 """
 
@@ -478,15 +478,44 @@ def build():
     return gltf
 
 
-def baked_in_full(node):
-    return {"dimmer_bake": "full"} if "KHR_lights_punctual" in node.get("extensions", {}) else {}
+# Of the demo alone: the figures of docs/measurements.md are of the house with lightmaps everywhere.
+GRID_LIT = {
+    "coffee_table", "dining_table", "dining_chair_1", "dining_chair_2", "dining_chair_3", "dining_chair_4",
+    "hall_bench", "cellar_crates", "den_chair", "study_chair",
+}  # fmt: skip
+# name: place and the direction in which the sample flies there and back, degrees from east to north
+MORE_GUESTS = {
+    "guest_sofa": ((1.2, 1.6, 6.6), 60),
+    "guest_lamp": ((1.5, 0.9, 7.0), 90),
+    "guest_table": ((1.9, 1.3, 1.2), 0),
+    "guest_worktop": ((1.6, 1.9, 2.6), 45),
+    "guest_arch": ((2.9, 1.0, 4.8), 90),
+    "guest_stairs": ((6.1, 1.7, 4.0), 90),
+    "guest_balustrade": ((5.8, 4.0, 2.6), 45),
+    "guest_study": ((2.4, 3.9, 2.6), 0),
+}
+
+
+def in_the_demo(node):
+    if "KHR_lights_punctual" in node.get("extensions", {}):
+        return {"dimmer_bake": "full"}
+    return {"dimmer_lighting": "local_grid"} if node["name"] in GRID_LIT else {}
+
+
+def more_guests():
+    nodes = []
+    for name, (place, degrees) in MORE_GUESTS.items():
+        half = math.radians(degrees) / 2
+        turn = [0, round(math.sin(half), 7), 0, round(math.cos(half), 7)]
+        nodes.append({"name": name, "translation": list(place), "rotation": turn, "extras": {"dimmer_dynamic": 1}})
+    return nodes
 
 
 def main():
     folder = pathlib.Path(sys.argv[1] if len(sys.argv) > 1 else pathlib.Path(__file__).parent)
     gltf = build()
     gltf.write(folder / "house.gltf", folder / "house.bin")
-    gltf.write(folder / "house_full.gltf", folder / "house.bin", baked_in_full)
+    gltf.write(folder / "house_full.gltf", folder / "house.bin", in_the_demo, more_guests())
 
 
 if __name__ == "__main__":

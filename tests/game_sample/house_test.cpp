@@ -63,7 +63,7 @@ TEST(House, HasThreeDoorsOneOfThemDouble) {
     EXPECT_EQ(leaves, (std::map<std::string, int>{{"den", 1}, {"front", 1}, {"living", 2}}));
 }
 
-TEST(House, FullDiffersOnlyInTheBakeOfItsLights) {
+TEST(House, FullDiffersOnlyInTheBakeOfItsLightsAndInWhatGridsLight) {
     const Scene indirect = load("house.gltf"), full = load("house_full.gltf");
     ASSERT_EQ(indirect.lights.size(), full.lights.size());
     for (size_t i = 0; i < full.lights.size(); ++i) {
@@ -72,10 +72,16 @@ TEST(House, FullDiffersOnlyInTheBakeOfItsLights) {
         EXPECT_EQ(indirect.lights[i].node, full.lights[i].node);
     }
     ASSERT_EQ(indirect.meshes.size(), full.meshes.size());
+    size_t grid_lit = 0;
     for (size_t i = 0; i < full.meshes.size(); ++i) {
         EXPECT_EQ(indirect.meshes[i].positions_m, full.meshes[i].positions_m);
         EXPECT_EQ(indirect.meshes[i].triangles, full.meshes[i].triangles);
+        EXPECT_NE(indirect.meshes[i].lighting, Lighting::LocalGrid) << indirect.meshes[i].node;
+        grid_lit += full.meshes[i].lighting == Lighting::LocalGrid;
     }
+    EXPECT_EQ(grid_lit, 10u);  // furniture of the demo
+    EXPECT_EQ(indirect.dynamic_places.size(), 4u);
+    EXPECT_EQ(full.dynamic_places.size(), 12u);
 }
 
 // Whatever is seen from inside a room shows its front: no crack, no wall seen from within, no face turned round.

@@ -140,6 +140,25 @@ TEST(SampleLevelRenderer, ABallIsLitByTheLightGridWhereItIs) {
     EXPECT_EQ(placeOf(script.balls[0], 30), script.balls[0].to_m);
 }
 
+// A node at (1, 2, 3), turned a quarter around Y: its X axis points to -Z. Models that stand or have a mesh are not for
+// balls, and without a grid there is no light for them.
+TEST(SampleBalls, OneFliesAtEachOfTheLevelsPlaces) {
+    PackData data = wall(true);
+    PlacedModel guest;
+    guest.node = "guest";
+    guest.world_from_model = {{{{0, 0, 1, 1}, {0, 1, 0, 2}, {-1, 0, 0, 3}}}};
+    data.models.push_back(guest);
+    EXPECT_TRUE(ballsAtPlaces(*Pack::fromData(data)).empty());
+    const std::vector<glm::vec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -2}};
+    data.probes.global = cook::tetrahedralise(points, {glm::vec3(-5), glm::vec3(5)}).value();
+    data.probes.base.assign(data.probes.global.positions.size(), {});
+    data.probes.record_counts = {0};
+    const auto balls = ballsAtPlaces(*Pack::fromData(data));
+    ASSERT_EQ(balls.size(), 1u);
+    EXPECT_EQ(balls[0].from_m, glm::vec3(1, 2, 3));
+    EXPECT_EQ(glm::normalize(balls[0].to_m - balls[0].from_m), glm::vec3(0, 0, -1));
+}
+
 // A plate 1 m in front of the viewer in 40 lux from all sides, of which its vertices see half. It stands, or it moves
 // and takes the same light from the global grid; drawn by one path.
 TEST(SampleLevelRenderer, AModelIsLitByItsGridAndShadowsItself) {

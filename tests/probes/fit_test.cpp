@@ -111,5 +111,24 @@ TEST(ProbeFit, IsTheMinimum) {
         }
 }
 
+// What was put where nothing was traced has no say: even light is even there too.
+TEST(ProbeFit, GuessesHaveNoSay) {
+    Random random(4);
+    const auto sites = randomSites(random, 40, 400);
+    FitValue even;
+    even.fill(3);
+    const std::vector<FitValue> targets(sites.size(), even);
+    std::vector<FitValue> probes(40, even);
+    std::vector<uint8_t> guessed(40, 0);
+    for (const size_t i : {7u, 21u}) {
+        probes[i].fill(1000);
+        guessed[i] = 1;
+    }
+    fitProbes(sites, targets, probes, 1e-3f, guessed);
+    // The tolerance is 0.001 of all light, that of 40 probes.
+    for (const FitValue& v : probes)
+        for (const float x : v) EXPECT_NEAR(x, 3, 3 * 0.001f * std::sqrt(40.0f));
+}
+
 }  // namespace
 }  // namespace dimmer::cook

@@ -1,0 +1,229 @@
+#include <probes/trial_grid.h>
+
+#include <probes/grid_error.h>
+#include <probes/spherical_harmonics.h>
+#include <probes/tetrahedra.h>
+#include <probes/visibility.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float importance_floor = 0.05f;  // of the mean light: darker places count no more
+// Of the mean light: errors of what is darker are as small as it. Every group counts alike here, so that faint ones ask
+// for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000.
+constexpr float floor_of_mean = 0.03f;
+constexpr float search_tolerance = 0.01f;  // of fits on the way: errors that count are larger
+
+}  // namespace
+
+TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
+                     const GridSettings& settings)
+    : rays_(rays),
+      states_(states),
+      settings_(settings),
+      places_(choice.places()),
+      first_corner_(places_.size() - choice.blocks.back().places_m.size()) {
+    auto corner = static_cast<uint32_t>(first_corner_);
+    for (const bool is_free : choice.corner_free) corners_.push_back(is_free ? corner++ : no_index);
+    decideImportance();
+}
+
+// How wrong a probe's place would be without it, by what its neighbours in sight have, times what it stands for.
+std::vector<float> TrialGrid::usefulness() const {
+    const size_t count = probes_.places.size();
+    std::vector<FitValue> around(count, FitValue{});
+    std::vector<float> weight(count, 0), useful(count, 0), shares(count, 0);
+    for (const auto& [a, b] : edges()) {
+        const glm::vec3 p = places_[probes_.places[a]], q = places_[probes_.places[b]];
+        if (rays_.blocked(p, q)) continue;
+        const float near = 1 / glm::dot(p - q, p - q);
+        for (const auto& [to, from] : {std::pair(a, b), std::pair(b, a)}) {
+            weight[to] += near;
+            for (size_t c = 0; c < 27; ++c) around[to][c] += near * states_[probes_.places[from]][c];
+        }
+    }
+    for (const FitSite& s : result_.placement.sites)
+        for (size_t k = 0; k < 4; ++k)
+            if (s.probes[k] < count) shares[s.probes[k]] += s.shares[k];
+    for (size_t i = 0; i < count; ++i) {
+        for (float& v : around[i]) v /= std::max(weight[i], 1e-12f);
+        useful[i] = shares[i] * errorOf(around[i], states_[probes_.places[i]]);
+    }
+    return useful;
+}
+
+// Of the tetrahedra, between probes; each once, ascending.
+std::vector<std::pair<uint32_t, uint32_t>> TrialGrid::edges() const {
+    std::vector<std::pair<uint32_t, uint32_t>> list;
+    for (const Tetrahedron& t : result_.placement.grid.tetrahedra)
+        for (const uint32_t a : t.probes)
+            for (const uint32_t b : t.probes)
+                if (a < b && b < probes_.places.size()) list.emplace_back(a, b);
+    std::ranges::sort(list);
+    list.erase(std::unique(list.begin(), list.end()), list.end());
+    return list;
+}
+
+// Between absolute errors and shares of the light that is there: least squares of shares would have lamps' light
+// too dark, as too bright costs more.
+void TrialGrid::decideImportance() {
+    // From the first coefficient to the mean irradiance: sqrt(pi) / 2.
+    const float to_lux = std::sqrt(pi) / 2;
+    double sum = 0;
+    for (size_t i = 0; i < first_corner_; ++i) sum += static_cast<double>(to_lux * states_[i][0]);
+    const auto mean = static_cast<float>(sum / static_cast<double>(first_corner_));
+    floor_lux_ = std::max(mean * floor_of_mean, 1e-12f);
+    for (const FitValue& state : states_) {
+        const float lux = to_lux * state[0] + importance_floor * mean + 1e-12f;
+        importance_.push_back(1 / lux);
+    }
+}
+
+Expected<void> TrialGrid::build(const ChosenProbes& probes) {
+    probes_ = probes;
+    is_probe_.assign(first_corner_, false);
+    std::vector<glm::vec3> points;
+    for (const uint32_t i : probes_.places) {
+        points.push_back(places_[i]);
+        is_probe_[i] = true;
+    }
+    auto grid = tetrahedralise(points, {rays_.boundsMin(), rays_.boundsMax()});
+    if (!grid) return std::unexpected(grid.error());
+    result_.placement.grid = std::move(*grid);
+    std::ranges::copy(probes_.levels, result_.placement.grid.levels.begin());
+    findPlaces();
+    locatePlaces();
+    if (settings_.visibility) findVisibility();
+    findShares();
+    findErrors();
+    return {};
+}
+
+void TrialGrid::restore(ChosenProbes probes, Result result) {
+    probes_ = std::move(probes);
+    result_ = std::move(result);
+    is_probe_.assign(first_corner_, false);
+    for (const uint32_t i : probes_.places) is_probe_[i] = true;
+}
+
+Placement TrialGrid::take() {
+    // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
+    result_.placement.sites.resize(first_corner_);
+    return std::move(result_.placement);
+}
+
+double TrialGrid::meanError() const {
+    double sum = 0;
+    for (const float e : result_.errors) sum += static_cast<double>(e);
+    return sum / static_cast<double>(result_.errors.size());
+}
+
+// The place that a position is; no_index: a corner that is not free.
+uint32_t TrialGrid::placeOf(uint32_t position) const {
+    return position < probes_.places.size() ? probes_.places[position] : corners_[position - probes_.places.size()];
+}
+bool TrialGrid::isFree(uint32_t position) const {
+    return placeOf(position) != no_index;
+}
+
+void TrialGrid::findPlaces() {
+    const auto count = static_cast<uint32_t>(result_.placement.grid.positions.size());
+    result_.placement.place_of.resize(count);
+    result_.placement.guessed.assign(count, 0);
+    for (uint32_t i = 0; i < count; ++i) {
+        result_.placement.place_of[i] = placeOf(i);
+        result_.placement.guessed[i] = !isFree(i);
+        float nearest = std::numeric_limits<float>::infinity();
+        for (uint32_t k = 0; k < count && !isFree(i); ++k) {
+            if (!isFree(k)) continue;
+            const float distance = glm::distance(vec(result_.placement.grid.positions[i]), places_[placeOf(k)]);
+            if (distance < nearest) nearest = distance, result_.placement.place_of[i] = placeOf(k);
+        }
+    }
+}
+
+void TrialGrid::locatePlaces() {
+    result_.at.resize(places_.size());
+    tbb::parallel_for(size_t{0}, places_.size(), [&](size_t i) {
+        const glm::vec3 p = places_[i];
+        result_.at[i] = locate(result_.placement.grid, {p.x, p.y, p.z});
+    });
+}
+
+void TrialGrid::findShares() {
+    result_.placement.sites.resize(places_.size());
+    tbb::parallel_for(size_t{0}, places_.size(), [&](size_t i) {
+        result_.placement.sites[i] = {.probes = result_.placement.grid.tetrahedra[result_.at[i].tetrahedron].probes,
+                                      .shares = probeWeights(result_.placement.grid, result_.at[i]),
+                                      .importance = importance_[i]};
+    });
+}
+
+// Tetrahedra of earlier rounds keep what was found: by the sites that their probes are, and the corners.
+using Key = std::array<uint32_t, 4>;
+TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
+    const auto name = [&](uint32_t position) {
+        return position < probes_.places.size()
+                   ? probes_.places[position]
+                   : static_cast<uint32_t>(places_.size() + position - probes_.places.size());
+    };
+    return {name(t.probes[0]), name(t.probes[1]), name(t.probes[2]), name(t.probes[3])};
+}
+
+void TrialGrid::findVisibility() {
+    GlobalGrid& grid = result_.placement.grid;
+    grid.visibility.resize(grid.tetrahedra.size());
+    std::vector<uint32_t> fresh;
+    for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) {
+        const auto found = seen_.find(keyOf(grid.tetrahedra[t]));
+        if (found != seen_.end())
+            grid.visibility[t] = found->second;
+        else
+            fresh.push_back(t);
+    }
+    std::vector<std::vector<std::array<float, 4>>> inside(grid.tetrahedra.size());
+    for (size_t i = 0; i < first_corner_; ++i)
+        if (!is_probe_[i]) inside[result_.at[i].tetrahedron].push_back(result_.at[i].barycentric);
+    tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
+        const Tetrahedron& t = grid.tetrahedra[fresh[i]];
+        std::array<glm::vec3, 4> corners;
+        std::array<bool, 4> free;
+        for (size_t k = 0; k < 4; ++k) {
+            corners[k] = vec(grid.positions[t.probes[k]]);
+            free[k] = isFree(t.probes[k]);
+        }
+        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[fresh[i]]);
+    });
+    for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
+}
+
+float TrialGrid::errorOf(const FitValue& light, const FitValue& traced) const {
+    float sum = 0;
+    for (size_t state = 0; state < site_states; ++state)
+        sum += gridError(&light[9 * state], &traced[9 * state], floor_lux_);
+    return sum / site_states;
+}
+
+// With the light that probes would be given.
+void TrialGrid::findErrors() {
+    std::vector<FitValue> probes;
+    for (const uint32_t place : result_.placement.place_of) probes.push_back(states_[place]);
+    fitProbes(std::span(result_.placement.sites).first(first_corner_), states_.first(first_corner_), probes,
+              search_tolerance, result_.placement.guessed);
+    result_.errors.resize(first_corner_);
+    tbb::parallel_for(size_t{0}, first_corner_, [&](size_t i) {
+        const FitSite& site = result_.placement.sites[i];
+        FitValue light{};
+        for (size_t k = 0; k < 4; ++k)
+            for (size_t c = 0; c < light.size(); ++c) light[c] += site.shares[k] * probes[site.probes[k]][c];
+        result_.errors[i] = is_probe_[i] ? 0 : errorOf(light, states_[i]);
+    });
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,71 @@
+// A grid of given probes, and how wrong it is: what placement tries out.
+#pragma once
+
+#include <probes/placement.h>
+#include <probes/tetrahedron_walk.h>
+
+#include <map>
+
+namespace dimmer::cook {
+
+// Places of SiteChoice without its corners, and the round in which each was taken.
+struct ChosenProbes {
+    std::vector<uint32_t> places;
+    std::vector<uint8_t> levels;
+};
+
+// Deterministic for any number of threads. `rays`, `states` and `settings` must outlive it.
+class TrialGrid {
+   public:
+    TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
+              const GridSettings& settings);
+
+    // All that follows is of the last grid built.
+    Expected<void> build(const ChosenProbes& probes);
+
+    struct Result {
+        Placement placement;  // with the corners' sites behind the others
+        std::vector<GridPlace> at;
+        std::vector<float> errors;  // per place but corners; 0 for probes
+    };
+    const Result& result() const { return result_; }
+    // Takes an earlier result of build() for the last one.
+    void restore(ChosenProbes probes, Result result);
+    Placement take();
+
+    double meanError() const;
+    // How wrong a probe's place would be without it, by what its neighbours in sight have, times what it stands for.
+    std::vector<float> usefulness() const;
+
+    const std::vector<glm::vec3>& places() const { return places_; }
+    size_t placeCount() const { return first_corner_; }  // without corners
+
+   private:
+    using Key = std::array<uint32_t, 4>;
+    void decideImportance();
+    uint32_t placeOf(uint32_t position) const;
+    bool isFree(uint32_t position) const;
+    void findPlaces();
+    void locatePlaces();
+    Key keyOf(const Tetrahedron& t) const;
+    void findVisibility();
+    void findShares();
+    void findErrors();
+    float errorOf(const FitValue& light, const FitValue& traced) const;
+    std::vector<std::pair<uint32_t, uint32_t>> edges() const;
+
+    const RayScene& rays_;
+    std::span<const FitValue> states_;  // per place
+    const GridSettings& settings_;
+    std::vector<glm::vec3> places_;  // and behind them the free corners of the box
+    size_t first_corner_;
+    std::vector<uint32_t> corners_;  // per corner: its place, or no_index
+    float floor_lux_ = 0;
+    std::vector<float> importance_;  // per place
+    std::map<Key, TetrahedronVisibility> seen_;
+    ChosenProbes probes_;
+    std::vector<bool> is_probe_;  // per place but corners
+    Result result_;
+};
+
+}  // namespace dimmer::cook
