@@ -54,11 +54,8 @@ nlohmann::ordered_json budgetsJson(const Profile& p) {
             {"base_lightmaps", p.budget_base_lightmaps},
             {"dynamic", p.budget_dynamic},
             {"global_grid", p.budget_global_grid},
+            {"local_grids", p.budget_local_grids},
             {"per_element", p.budget_per_element}};
-}
-
-uint64_t localGridBytes(const PackData& d) {
-    return (d.probes.base.size() - d.probes.global.positions.size()) * sizeof(ProbeRecord);
 }
 
 // Per level of refinement.
@@ -102,13 +99,13 @@ std::vector<Flatness> worstTetrahedra(const GlobalGrid& grid, size_t count) {
     return all;
 }
 
-void printModels(const PackData& d) {
+void printModels(const PackData& d, const PackCost& cost) {
     if (d.models.empty()) return;
     size_t triangles = 0;
     for (const ModelMesh& m : d.model_meshes) triangles += m.indices.size() / 3;
     fmt::print("\nmodels: {}; {} meshes, {} triangles; {} local grids, {} probes, {}\n", d.models.size(),
                d.model_meshes.size(), triangles, d.probes.local.size(),
-               d.probes.base.size() - d.probes.global.positions.size(), humanBytes(localGridBytes(d)));
+               d.probes.base.size() - d.probes.global.positions.size(), humanBytes(cost.local_grids));
     fmt::print("{:<26} {:>12}   meshes\n", "model", "probes");
     for (const PlacedModel& m : d.models)
         fmt::print("{:<26} {:>12}   {}\n", m.node,
@@ -140,7 +137,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                   {"device", cost.device()},
                   {"base_lightmap", cost.base_lightmap},
                   {"dynamic", cost.dynamic},
-                  {"local_grids", localGridBytes(d)},
+                  {"local_grids", cost.local_grids},
                   {"global_grid", cost.global_grid},
                   {"ancillary", cost.ancillary},
                   {"meshes", cost.meshes}};
@@ -187,7 +184,7 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
         d.page_count, d.page_width, d.page_height, d.exposure, d.clusters.size(), d.batches.size(),
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
     printGrid(d, cost);
-    printModels(d);
+    printModels(d, cost);
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
     for (const Contribution& c : d.contributions)
         fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,

@@ -39,7 +39,8 @@ PackCost costOf(const PackData& pack) {
     cost.dynamic = bytes.dynamic;
     const GlobalGrid& grid = pack.probes.global;
     cost.global_grid = grid.positions.size() * sizeof(ProbeRecord) + gridTableBytes(grid);
-    cost.ancillary = bytes.ancillary - cost.global_grid;
+    cost.local_grids = (pack.probes.base.size() - grid.positions.size()) * sizeof(ProbeRecord);
+    cost.ancillary = bytes.ancillary - cost.global_grid - cost.local_grids;
     for (const Mesh& m : pack.meshes)
         cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
     for (const ModelMesh& m : pack.model_meshes)
@@ -73,6 +74,7 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
     check("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
     check("dynamic records", cost.dynamic, profile.budget_dynamic);
     check("global grid", cost.global_grid, profile.budget_global_grid);
+    check("local grids", cost.local_grids, profile.budget_local_grids);
     for (const ElementCost& e : cost.elements)
         check(fmt::format("element '{}'", pack.elements[e.element].name), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
@@ -115,6 +117,7 @@ std::string budgetTable(const PackData& pack, const PackCost& cost, const Profil
     row("base lightmaps", cost.base_lightmap, budgets.budget_base_lightmaps);
     row("dynamic records", cost.dynamic, budgets.budget_dynamic);
     row("global grid", cost.global_grid, budgets.budget_global_grid);
+    row("local grids", cost.local_grids, budgets.budget_local_grids);
     row("ancillary", cost.ancillary, 0);
     row("total on the device", cost.device(), budgets.budget_total);
     table += fmt::format("\n{:<26} {:>12} {:>12} {:>15}  {}\n", "element", "bytes", "receivers", "energy dropped",

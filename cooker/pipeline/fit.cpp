@@ -14,7 +14,8 @@ namespace {
 
 // The next density leaves this much room: charts do not shrink in proportion, as their padding stays.
 constexpr double density_margin = 0.97;
-constexpr double density_factor_max = 16;  // coarser pages are none
+constexpr uint32_t local_probes_least = 8;  // a gradient along each axis
+constexpr double density_factor_max = 16;   // coarser pages are none
 
 // One budget that is set: what it would hold at some rungs.
 struct Limit {
@@ -25,6 +26,10 @@ struct Limit {
 
 bool gridIsOver(const PackCost& cost, const Profile& profile) {
     return profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid;
+}
+
+bool localGridsAreOver(const PackCost& cost, const Profile& profile) {
+    return profile.budget_local_grids > 0 && cost.local_grids > profile.budget_local_grids;
 }
 
 // Bytes of PackCost::dynamic that are not texels'.
@@ -80,7 +85,7 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
     remedy.saves = cost.dynamic - std::min(cost.dynamic, losses.dynamicBytes(rungs) + probeRecords(cost, losses));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
-    remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile);
+    remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     for (uint32_t g = 1; g < rungs.size(); ++g) {
         if (rungs[g] == 0) continue;
         const float from = thresholdOf(pack, profile, g);
@@ -149,9 +154,9 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
     if (!(to < from)) return remedy;
     const double left = losses.texelsLeft(static_cast<double>(from) / static_cast<double>(to));
     remedy.changes.push_back({"lightmaps.texels_per_metre", from, to});
-    remedy.fits = left <= 1 / over && !gridIsOver(cost, profile);
+    remedy.fits = left <= 1 / over && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     remedy.error = losses.densityError(static_cast<double>(from) / static_cast<double>(to));
-    const uint64_t of_texels = cost.device() - cost.global_grid - probeRecords(cost, losses);
+    const uint64_t of_texels = cost.device() - cost.global_grid - cost.local_grids - probeRecords(cost, losses);
     remedy.saves = static_cast<uint64_t>(static_cast<double>(of_texels) * (1 - left));
     return remedy;
 }
@@ -180,7 +185,31 @@ Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profi
                                          (1 - static_cast<double>(to) / static_cast<double>(probes)));
     Profile others = profile;
     others.budget_total = others.budget_global_grid = 0;
-    remedy.fits = !(overBy(cost, others) > 1);
+    remedy.fits = !(overBy(cost, others) > 1) && !localGridsAreOver(cost, profile);
+    remedy.moves_light = true;
+    return remedy;
+}
+
+// Fewer probes for the models that have most: the largest number at which all fit. A grid may end up below it, as
+// whole planes of probes go.
+Remedy byLocalProbes(const PackData& pack, const PackCost& cost, const Profile& profile) {
+    Remedy remedy;
+    if (!localGridsAreOver(cost, profile)) return remedy;
+    const auto bytesAt = [&](uint32_t most) {
+        uint64_t probes = 0;
+        for (const LocalGrid& grid : pack.probes.local) probes += std::min<uint64_t>(grid.probeCount(), most);
+        return probes * sizeof(ProbeRecord);
+    };
+    uint32_t to = local_probes_least;
+    while (to < profile.local_probes_max && bytesAt(to + 1) <= profile.budget_local_grids) ++to;
+    if (to >= profile.local_probes_max) return remedy;
+    remedy.changes.push_back(
+        {"grids.local_probes_max", static_cast<float>(profile.local_probes_max), static_cast<float>(to)});
+    remedy.saves = cost.local_grids - std::min(cost.local_grids, bytesAt(to));
+    Profile others = profile;
+    others.budget_local_grids = 0;
+    remedy.fits =
+        bytesAt(to) <= profile.budget_local_grids && !(overBy(cost, others) > 1) && !gridIsOver(cost, profile);
     remedy.moves_light = true;
     return remedy;
 }
@@ -208,7 +237,7 @@ std::string Remedy::text() const {
     return fmt::format("{}{}: saves {:.2f} MB, adds a mean error of {:.2f} %{}", fmt::join(parts, ", "), more,
                        static_cast<double>(saves) / 1e6, 100 * error,
                        energy > 0    ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy)
-                       : moves_light ? ", coarsens the light of what moves"
+                       : moves_light ? ", coarsens the light of models"
                                      : "");
 }
 
@@ -221,6 +250,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
     };
     add(byDensity(cost, profile, losses));
     add(byProbes(pack, cost, profile, losses));
+    add(byLocalProbes(pack, cost, profile));
     if (!baseIsOver(cost, profile) && exceeded(limits, Rungs(losses.groupCount(), 0))) {
         const auto by = [&](const Rungs& rungs) { add(byRungs(pack, cost, profile, losses, limits, rungs)); };
         by(greedy(losses, limits));
@@ -236,6 +266,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
     const auto limits = limitsOf(pack, cost, profile, losses);
     if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile, losses);
+    if (localGridsAreOver(cost, profile)) return byLocalProbes(pack, cost, profile);
     if (!baseIsOver(cost, profile)) {
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
         if (thresholds.fits && !thresholds.changes.empty()) return thresholds;

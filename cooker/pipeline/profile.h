@@ -38,7 +38,7 @@ struct Quality {
 struct Profile {
     // Bytes; 0: no limit.
     uint64_t budget_total = 0, budget_base_lightmaps = 0, budget_dynamic = 0, budget_global_grid = 0,
-             budget_per_element = 0;
+             budget_local_grids = 0, budget_per_element = 0;
     float texels_per_metre = 4;
     uint32_t page_size = 2048;
     ColorFormat color_format = ColorFormat::E5B9G9R9;

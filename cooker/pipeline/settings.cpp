@@ -114,6 +114,10 @@ void addBudgets(Profile& p, std::vector<Setting>& list) {
         {"budgets.global_grid", &p.budget_global_grid, 0, any,
          "bytes of the global grid's probes and of its tetrahedra; 0: no limit. The records of sets and doors at "
          "its probes are part of budgets.dynamic"});
+    list.push_back(
+        {"budgets.local_grids", &p.budget_local_grids, 0, any,
+         "bytes of the probes of models' own grids; 0: no limit. The records of sets and doors at them are part "
+         "of budgets.dynamic"});
     list.push_back({"budgets.per_element", &p.budget_per_element, 0, any,
                     "bytes of the records that name one light set or door; 0: no limit. Keeps one lamp that lights the "
                     "whole level from eating the budget of all others"});

@@ -12,7 +12,7 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float error_max = 6;  // what is hopelessly wrong is not worse than that
+constexpr float error_max = 2;  // what is hopelessly wrong is not worse than that
 
 // Six along the axes and eight between: the corners and sides of a cube.
 struct Normals {

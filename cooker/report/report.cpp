@@ -143,6 +143,7 @@ class Report {
         budget("base lightmaps", cost_.base_lightmap, profile.budget_base_lightmaps, cost_.device());
         budget("dynamic records", cost_.dynamic, profile.budget_dynamic, cost_.device());
         budget("global grid", cost_.global_grid, profile.budget_global_grid, cost_.device());
+        budget("local grids", cost_.local_grids, profile.budget_local_grids, cost_.device());
         budget("ancillary", cost_.ancillary, 0, cost_.device());
         body_ += "</div>\n";
     }

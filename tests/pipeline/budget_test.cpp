@@ -27,7 +27,8 @@ TEST(Budget, CostsAreSums) {
     }
     EXPECT_EQ(cost.dynamic, 8 * (records + receivers));
     EXPECT_GE(cost.ancillary, receivers);  // a byte each says where it is
-    EXPECT_EQ(cost.device(), cost.base_lightmap + cost.dynamic + cost.global_grid + cost.ancillary);
+    EXPECT_EQ(cost.device(), cost.base_lightmap + cost.dynamic + cost.global_grid + cost.local_grids + cost.ancillary);
+    EXPECT_EQ(cost.local_grids, 28 * (data.probes.base.size() - data.probes.global.positions.size()));
     // Two squares with lightmaps, two meshes of models.
     EXPECT_EQ(cost.meshes, 2u * (4 * 32 + 6 * 4) + 2u * (5 * 20 + 9 * 4));
 }

@@ -195,6 +195,35 @@ TEST_F(Fit, FewerProbesWhereTheGridIsTooLarge) {
                 0.15 * static_cast<double>(all));
 }
 
+// Grids of 64, 27 and 8 probes may have 60 in all: 26 + 26 + 8.
+TEST(LocalGridBudget, TakesFromTheLargest) {
+    PackData pack;
+    for (const uint32_t side : {4u, 3u, 2u}) pack.probes.local.emplace_back().counts = {side, side, side};
+    pack.probes.base.resize(64 + 27 + 8);
+    const PackCost cost = costOf(pack);
+    EXPECT_EQ(cost.local_grids, 99u * 28);
+    Profile profile;
+    profile.budget_local_grids = 60 * 28;
+    const auto over = checkBudgets(pack, cost, profile);
+    ASSERT_FALSE(over);
+    EXPECT_EQ(over.error().code, ErrorCode::OverBudget);
+    EXPECT_THAT(over.error().message, HasSubstr("local grids: "));
+    EXPECT_THAT(budgetTable(pack, cost, profile), HasSubstr("165.0 % of 1.7 kB"));
+    for (const Remedy& remedy : {fittingRemedy(pack, cost, profile, {}), remedies(pack, cost, profile, {}).at(0)}) {
+        ASSERT_EQ(remedy.changes.size(), 1u);
+        EXPECT_EQ(remedy.changes[0].key, "grids.local_probes_max");
+        EXPECT_EQ(remedy.changes[0].to, 26);
+        EXPECT_EQ(remedy.saves, 39u * 28);
+        EXPECT_TRUE(remedy.fits);
+    }
+    // With 8 each, a gradient along every axis, there is nothing left to take.
+    profile.budget_local_grids = 23 * 28;
+    EXPECT_FALSE(fittingRemedy(pack, cost, profile, {}).fits);
+    profile.budget_local_grids = 99 * 28;
+    EXPECT_TRUE(checkBudgets(pack, cost, profile));
+    EXPECT_TRUE(remedies(pack, cost, profile, {}).empty());
+}
+
 TEST_F(Fit, OneElement) {
     const auto whole = run("", false);
     ASSERT_TRUE(whole.has_value());
