@@ -325,7 +325,7 @@ namespace {
 
 // Null where the options ask for none, or where only a run without one measures what it is to measure.
 std::optional<CookCache> openCache(const CookOptions& options, CookStats& stats) {
-    if (options.cache.empty() || options.per_set_passes) return {};
+    if (options.cache.empty() || options.per_set_passes || !options.grid_baseline.empty()) return {};
     auto store = CacheStore::open(options.cache);
     if (store) return CookCache(std::move(*store), options.pack);
     stats.warnings.push_back("cooked without a cache: " + store.error().message);
