@@ -14,6 +14,10 @@ namespace {
 // 8192 x 8192: 1 GiB as linear floats, and what GPUs handle everywhere.
 constexpr uint64_t image_texels_max = uint64_t{1} << 26;
 
+// Of the encoded bytes: deflate packs at most 1032 bytes into one (RFC 1951), and a byte of PNG at most 8 texels.
+// Without it a header alone would have hundreds of megabytes reserved.
+constexpr uint64_t texels_per_byte_max = 1032 * 8;
+
 // IEC 61966-2-1.
 float linearFromSrgb(float encoded) {
     return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
@@ -74,10 +78,12 @@ Expected<Image> decodeImage(const ImportContext& context, int index, TransferFun
 
     const auto size = static_cast<int>(std::min<size_t>(bytes.size(), std::numeric_limits<int>::max()));
     int width = 0, height = 0, channels = 0;
-    const bool known = stbi_info_from_memory(bytes.data(), size, &width, &height, &channels) != 0;
-    if (known && static_cast<uint64_t>(width) * static_cast<uint64_t>(height) > image_texels_max)
+    bool known = stbi_info_from_memory(bytes.data(), size, &width, &height, &channels) != 0;
+    const uint64_t texels = static_cast<uint64_t>(width) * static_cast<uint64_t>(height);
+    if (known && texels > image_texels_max)
         return context.error(
             owner, fmt::format("{} has {} x {} texels. Scale it to 8192 x 8192 or less.", label, width, height));
+    known = known && texels <= texels_per_byte_max * bytes.size();
     const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
         known ? stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, 4) : nullptr, stbi_image_free);
     if (!pixels || width < 1 || height < 1)

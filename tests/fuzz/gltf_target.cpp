@@ -99,8 +99,18 @@ std::vector<Bytes> gltfSeeds() {
     const cook::test::LevelFile rare = rareLevel();
     const auto imported = rare.import();
     require(imported.has_value() && imported->images.size() == 1, "the rare seed is a level");
-    return {full.glb(), bytesOf(full.gltfText()), floor.glb(), bytesOf(floor.gltfText()),
-            rare.glb(), bytesOf(rare.gltfText())};
+    cook::test::LevelFile boasting = rare;  // its picture's header claims 8192 x 8192 texels
+    std::string picture = boasting.document["images"][0]["uri"];
+    constexpr std::string_view size = "AAAAEAAAABCAYA";
+    picture.replace(picture.find(size), size.size(), "AAIAAAACAACAYA");
+    boasting.document["images"][0]["uri"] = picture;
+    return {full.glb(),
+            bytesOf(full.gltfText()),
+            floor.glb(),
+            bytesOf(floor.gltfText()),
+            rare.glb(),
+            bytesOf(rare.gltfText()),
+            bytesOf(boasting.gltfText())};
 }
 
 }  // namespace dimmer::fuzz
