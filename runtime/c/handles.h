@@ -52,6 +52,20 @@ bool given(const Pointers*... pointers) noexcept {
     return false;
 }
 
+// The runtime behind the lights, or null, and reported, where it is the other one.
+template <class Wanted, class Lights>
+auto* runtimeAs(Lights* lights) {
+    auto* runtime = std::get_if<Wanted>(&lights->runtime);
+    if (!runtime)
+        report(ErrorCode::Unsupported, std::is_same_v<Wanted, CpuRuntime>
+                                           ? "these lights are blended by Vulkan, not on the CPU"
+                                           : "these lights are blended on the CPU, not by Vulkan");
+    return runtime;
+}
+
+// Reports that the pack has no `what` of that number.
+dimmer_result noSuch(const char* what, uint32_t index, size_t count);
+
 // The result of an Expected<void>.
 inline dimmer_result finish(const Expected<void>& done) noexcept {
     return done ? DIMMER_OK : report(done.error());

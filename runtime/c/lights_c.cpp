@@ -24,17 +24,6 @@ dimmer_result finish(const Expected<UpdateStats>& done, dimmer_update_stats* out
 
 namespace {
 
-// The runtime behind the lights, or null, and reported, where it is the other one.
-template <class Wanted, class Lights>
-auto* as(Lights* lights) {
-    auto* runtime = std::get_if<Wanted>(&lights->runtime);
-    if (!runtime)
-        report(ErrorCode::Unsupported, std::is_same_v<Wanted, CpuRuntime>
-                                           ? "these lights are blended by Vulkan, not on the CPU"
-                                           : "these lights are blended on the CPU, not by Vulkan");
-    return runtime;
-}
-
 dimmer_result copyPages(std::span<const uint32_t> irradiance, std::span<const uint32_t> direction,
                         uint32_t* irradiance_out, uint32_t* direction_out, size_t room) {
     if (room < irradiance.size())
@@ -51,17 +40,19 @@ dimmer_result copyPages(std::span<const uint32_t> irradiance, std::span<const ui
 using namespace dimmer;
 using namespace dimmer::c;
 
-dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, dimmer_lights** lights) {
+dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
+                                       dimmer_lights** lights) {
     if (!given(pack, lights)) return DIMMER_INVALID_ARGUMENT;
     if (thread_count == 0) return report(ErrorCode::InvalidArgument, "lights on the CPU need one thread at least");
     return guarded([&] {
-        *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count)};
+        *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count, moving_probes_max)};
         return DIMMER_OK;
     });
 }
 
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
-                                          dimmer_buffering buffering, dimmer_lights** lights) {
+                                          dimmer_buffering buffering, uint32_t moving_probes_max,
+                                          dimmer_lights** lights) {
     if (!given(pack, vulkan, lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         const VulkanContext context{.instance = vulkan->instance,
@@ -73,6 +64,7 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
                                     .compute_queue_family = vulkan->compute_queue_family};
         RuntimeOptions options;
         options.buffering = buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace;
+        options.moving_probes_max = moving_probes_max;
         auto created = Runtime::create(context, pack->pack, options);
         if (!created) return report(created.error());
         *lights = new dimmer_lights{std::move(*created)};
@@ -123,7 +115,7 @@ dimmer_result dimmer_lights_get_weight(const dimmer_lights* lights, uint32_t ele
 dimmer_result dimmer_lights_update(dimmer_lights* lights, dimmer_update_stats* stats) {
     if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        auto* runtime = as<CpuRuntime>(lights);
+        auto* runtime = runtimeAs<CpuRuntime>(lights);
         return runtime ? finish(runtime->update(), stats) : DIMMER_UNSUPPORTED;
     });
 }
@@ -144,7 +136,7 @@ dimmer_result dimmer_lights_get_pages(const dimmer_lights* lights, const uint32_
                                       const uint32_t** direction, size_t* texel_count) {
     if (!given(lights, irradiance, direction, texel_count)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        const auto* runtime = as<CpuRuntime>(lights);
+        const auto* runtime = runtimeAs<CpuRuntime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
         *irradiance = runtime->irradiancePages().data();
         *direction = runtime->directionPages().data();
@@ -156,7 +148,7 @@ dimmer_result dimmer_lights_get_pages(const dimmer_lights* lights, const uint32_
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats) {
     if (!given(lights, commands)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        auto* runtime = as<Runtime>(lights);
+        auto* runtime = runtimeAs<Runtime>(lights);
         return runtime ? finish(runtime->record(commands), stats) : DIMMER_UNSUPPORTED;
     });
 }
@@ -164,7 +156,7 @@ dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer comman
 dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats) {
     if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        auto* runtime = as<Runtime>(lights);
+        auto* runtime = runtimeAs<Runtime>(lights);
         return runtime ? finish(runtime->submit(), stats) : DIMMER_UNSUPPORTED;
     });
 }
@@ -172,7 +164,7 @@ dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* s
 dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* stats) {
     if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        auto* runtime = as<Runtime>(lights);
+        auto* runtime = runtimeAs<Runtime>(lights);
         return runtime ? finish(runtime->wait(), stats) : DIMMER_UNSUPPORTED;
     });
 }
@@ -180,7 +172,7 @@ dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* sta
 dimmer_result dimmer_lights_get_semaphore(const dimmer_lights* lights, VkSemaphore* semaphore, uint64_t* value) {
     if (!given(lights, semaphore, value)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        const auto* runtime = as<Runtime>(lights);
+        const auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
         *semaphore = runtime->semaphore();
         *value = runtime->semaphoreValue();
@@ -191,7 +183,7 @@ dimmer_result dimmer_lights_get_semaphore(const dimmer_lights* lights, VkSemapho
 dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images) {
     if (!given(lights, images)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        const auto* runtime = as<Runtime>(lights);
+        const auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
         const LightmapImages from = runtime->images();
         *images = {.irradiance = from.irradiance,

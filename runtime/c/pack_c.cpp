@@ -41,10 +41,6 @@ dimmer_result give(Expected<Pack> opened, dimmer_pack** pack) {
     return DIMMER_OK;
 }
 
-dimmer_result noSuch(const char* what, uint32_t index, size_t count) {
-    return report({ErrorCode::NotFound, fmt::format("there is no {} {}; the pack has {}", what, index, count)});
-}
-
 // The C vertex is the pack's own.
 static_assert(sizeof(dimmer_vertex) == sizeof(MeshVertex));
 static_assert(offsetof(dimmer_vertex, position_m) == offsetof(MeshVertex, position_m));
@@ -60,6 +56,10 @@ dimmer_result report(ErrorCode code, const char* message) noexcept {
         last_message.clear();  // no memory for the message: the result alone has to do
     }
     return resultOf(code);
+}
+
+dimmer_result noSuch(const char* what, uint32_t index, size_t count) {
+    return report({ErrorCode::NotFound, fmt::format("there is no {} {}; the pack has {}", what, index, count)});
 }
 
 }  // namespace dimmer::c
@@ -98,7 +98,9 @@ dimmer_result dimmer_pack_get_info(const dimmer_pack* pack, dimmer_pack_info* in
              .exposure = p.exposure(),
              .element_count = static_cast<uint32_t>(p.elements().size()),
              .mesh_count = static_cast<uint32_t>(p.meshes().size()),
-             .viewpoint_count = static_cast<uint32_t>(p.viewpoints().size())};
+             .viewpoint_count = static_cast<uint32_t>(p.viewpoints().size()),
+             .model_count = static_cast<uint32_t>(p.models().size()),
+             .model_mesh_count = static_cast<uint32_t>(p.modelMeshes().size())};
     return DIMMER_OK;
 }
 

@@ -31,6 +31,8 @@ int look_into_pack(const char* path) {
     dimmer_element element;
     dimmer_mesh mesh;
     dimmer_viewpoint viewpoint;
+    dimmer_placed_model model;
+    dimmer_model_mesh model_mesh;
     uint32_t index = 77;
     EXPECT_OK(dimmer_pack_open(path, &pack));
     EXPECT_OK(dimmer_pack_get_info(pack, &info));
@@ -38,6 +40,13 @@ int look_into_pack(const char* path) {
     EXPECT(info.exposure == 1.0f / 64);
     EXPECT(info.color_format == DIMMER_R11G11B10F && info.direction_model == DIMMER_AHD);
     EXPECT(info.element_count == 6 && info.mesh_count == 2 && info.viewpoint_count == 2);
+    EXPECT(info.model_count == 2 && info.model_mesh_count == 2);
+    EXPECT_OK(dimmer_pack_get_model(pack, 1, &model));
+    EXPECT(model.world_from_model[3] == 4 && model.world_from_model[11] == 6 && model.world_from_model[2] == 1);
+    EXPECT_FAILURE(DIMMER_NOT_FOUND, "no model 2", dimmer_pack_get_model(pack, 2, &model));
+    EXPECT_OK(dimmer_pack_get_model_mesh(pack, 0, &model_mesh));
+    EXPECT(model_mesh.index_count % 3 == 0 && model_mesh.indices[0] < model_mesh.vertex_count);
+    EXPECT_FAILURE(DIMMER_NOT_FOUND, "no model mesh 2", dimmer_pack_get_model_mesh(pack, 2, &model_mesh));
 
     EXPECT_OK(dimmer_pack_get_element(pack, 0, &element));
     EXPECT(strcmp(element.name, "set0") == 0 && element.kind == DIMMER_LIGHT_SET && element.max_weight == 2);
@@ -92,9 +101,9 @@ int misuse(const char* path) {
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_set_weight(NULL, 0, 1));
 
     EXPECT_OK(dimmer_pack_open(path, &pack));
-    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "one thread", dimmer_lights_create_cpu(pack, 0, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "one thread", dimmer_lights_create_cpu(pack, 0, 0, &lights));
     EXPECT(lights == NULL);
-    EXPECT_OK(dimmer_lights_create_cpu(pack, 2, &lights));
+    EXPECT_OK(dimmer_lights_create_cpu(pack, 2, 0, &lights));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "\"set0\"", dimmer_lights_set_weight(lights, 0, 2.5f));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "\"set0\"", dimmer_lights_set_weight(lights, 0, NAN));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "set0", dimmer_lights_set_weight_rgb(lights, 0, 1, -1, 1));
@@ -115,6 +124,54 @@ int misuse(const char* path) {
     dimmer_pack_close(pack);
     dimmer_lights_destroy(NULL);
     dimmer_pack_close(NULL);
+    return 0;
+}
+
+int light_a_model(const char* path, float before_lux[3], float after_lux[3], float air_lux[3]) {
+    const dimmer_model_grid grid = {{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}, {2, 2, 2}};
+    const float here[12] = {1, 0, 0, 4, 0, 1, 0, 1, 0, 0, 1, 6}, there[12] = {1, 0, 0, 8, 0, 1, 0, 1, 0, 0, 1, 6};
+    const float flat[12] = {0};
+    const float middle[3] = {4, 1, 6}, later[3] = {8, 1, 6}, up[3] = {0, 1, 0};
+    dimmer_pack* pack = NULL;
+    dimmer_lights* lights = NULL;
+    dimmer_model model = {77, 77}, second;
+    dimmer_model_slot slot;
+    const uint32_t* probes;
+    size_t words;
+    uint32_t hint = DIMMER_NONE;
+    float radiance[27];
+    int i;
+    EXPECT_OK(dimmer_pack_open(path, &pack));
+    EXPECT_OK(dimmer_lights_create_cpu(pack, 1, 8, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "", dimmer_lights_add_model(lights, &grid, flat, &model));
+    EXPECT(model.index == 77);
+    EXPECT_OK(dimmer_lights_add_model(lights, &grid, here, &model));
+    EXPECT_FAILURE(DIMMER_OUT_OF_MEMORY, "", dimmer_lights_add_model(lights, &grid, here, &second));
+    EXPECT_OK(dimmer_lights_update(lights, NULL));
+    EXPECT_OK(dimmer_lights_get_probes(lights, &probes, &words));
+    EXPECT_OK(dimmer_lights_get_model_slot(lights, model, &slot));
+    EXPECT(slot.counts[0] == 2 && words == 7 * (slot.first_probe + 8));
+    EXPECT_OK(dimmer_sample_model(pack, probes, words, &slot, middle, up, before_lux));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "words",
+                   dimmer_sample_model(pack, probes, words - 1, &slot, middle, up, air_lux));
+
+    EXPECT_OK(dimmer_lights_move_model(lights, model, there));
+    EXPECT_OK(dimmer_lights_update(lights, NULL));
+    EXPECT_OK(dimmer_lights_get_model_slot(lights, model, &slot));
+    EXPECT_OK(dimmer_sample_model(pack, probes, words, &slot, later, up, after_lux));
+    EXPECT_OK(dimmer_sample_air(pack, probes, words, later, up, &hint, air_lux));
+    EXPECT(hint != DIMMER_NONE);
+    EXPECT_OK(dimmer_sample_radiance(pack, probes, words, later, NULL, radiance));
+    /* Light from everywhere: E = pi L, and L Y_00 = L_00 / (4 pi). */
+    EXPECT(fabsf(radiance[0] * 0.886226925f - air_lux[0]) < 1e-4f * air_lux[0]);
+    for (i = 3; i < 27; ++i) EXPECT(radiance[i] == 0);
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "words", dimmer_sample_air(pack, probes, 7, later, up, NULL, air_lux));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_sample_air(pack, probes, words, later, NULL, NULL, air_lux));
+
+    EXPECT_OK(dimmer_lights_remove_model(lights, model));
+    EXPECT(dimmer_lights_move_model(lights, model, here) != DIMMER_OK);
+    dimmer_lights_destroy(lights);
+    dimmer_pack_close(pack);
     return 0;
 }
 
@@ -143,7 +200,7 @@ int blend_on_cpu(const char* path, uint32_t* irradiance, uint32_t* direction, si
     size_t own_count;
     int failed;
     EXPECT_OK(dimmer_pack_open(path, &pack));
-    EXPECT_OK(dimmer_lights_create_cpu(pack, 1, &lights));
+    EXPECT_OK(dimmer_lights_create_cpu(pack, 1, 0, &lights));
     if ((failed = set_state(pack, lights)) != 0) return failed;
     dimmer_pack_close(pack); /* the lights keep what they need */
     EXPECT_OK(dimmer_lights_update(lights, &stats));
@@ -198,7 +255,7 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     uint32_t* by_submit = malloc(8 * texel_count);
     EXPECT(by_submit != NULL);
     EXPECT_OK(dimmer_pack_open(path, &pack));
-    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_IN_PLACE, &lights));
+    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_IN_PLACE, 0, &lights));
     if ((failed = set_state(pack, lights)) != 0) return failed;
     EXPECT_OK(dimmer_lights_submit(lights, NULL));
     EXPECT_OK(dimmer_lights_wait(lights, &stats));
@@ -243,7 +300,7 @@ int shade_player(const char* path, float lux[3]) {
     const float uv[2] = {0.25f, 0.5f}, normal_tangent[3] = {0, 0, 1};
 
     if (dimmer_pack_open(path, &pack) != DIMMER_OK) return give_up(); /* prints dimmer_error_message() */
-    if (dimmer_lights_create_cpu(pack, 1, &lights) != DIMMER_OK) return give_up();
+    if (dimmer_lights_create_cpu(pack, 1, 0, &lights) != DIMMER_OK) return give_up();
     if (dimmer_pack_find_light_set(pack, "hall", &hall) != DIMMER_OK) return give_up();
 
     dimmer_lights_set_weight_rgb(lights, hall, 1, 0.2f, 0.2f);

@@ -17,6 +17,9 @@ int look_into_pack(const char* path);
 int misuse(const char* path);
 /* set0 at 0.5, set1 at 2/0.25/0, door0 half open, on the CPU; the pages into arrays of `texel_count`. */
 int blend_on_cpu(const char* path, uint32_t* irradiance, uint32_t* direction, size_t texel_count);
+/* A model of 2 x 2 x 2 probes in a metre's box at (4, 1, 6), then at (8, 1, 6), in a pack with a global grid: light on
+ * its middle, upwards; then that of the air there. */
+int light_a_model(const char* path, float before_lux[3], float after_lux[3], float air_lux[3]);
 /* The same state on a Vulkan device, first by submit, then, with all sets off between, by record. */
 int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irradiance, uint32_t* direction,
                     size_t texel_count);

@@ -4,8 +4,12 @@
 #include <gmock/gmock.h>
 #include <pack/sample_pack.h>
 #include <runtime/gpu_fixture.h>
+#include <runtime/model_pack.h>
 #include <scene/level_file.h>
 #include <write/pack_writer.h>
+
+#include <cmath>
+#include <numbers>
 
 namespace dimmer::test {
 namespace {
@@ -50,6 +54,22 @@ TEST(CInterface, BlendsOnTheCpu) {
     const BlendedPages expected = expectedPages();
     EXPECT_EQ(pages.irradiance, expected.irradiance);
     EXPECT_EQ(pages.direction, expected.direction);
+}
+
+// Light that grows with x: L = (1 + x) from everywhere is pi (1 + x) lux.
+TEST(CInterface, LightsAModelThatMoves) {
+    const cook::test::TemporaryFolder folder;
+    const auto path = folder.path / "grid.dimmer";
+    const PackData data = modelPack(1, 800, [](glm::vec3 p) {
+        return glm::vec3(std::sqrt(4 * std::numbers::pi_v<float>) * (1 + std::clamp(p.x, 0.0f, 12.0f)) / 64);
+    });
+    ASSERT_TRUE(cook::writeFileAtomically(path, cook::packBytes(data)));
+    std::array<float, 3> before{}, after{}, air{};
+    ASSERT_EQ(light_a_model(path.c_str(), before.data(), after.data(), air.data()), 0) << problem;
+    // Two roundings to 9 bits of numbers up to 13, at a tenth of the light at least: half a per cent.
+    EXPECT_NEAR(before[0], 5 * std::numbers::pi_v<float>, 0.005f * before[0]);
+    EXPECT_NEAR(after[1], 9 * std::numbers::pi_v<float>, 0.005f * after[1]);
+    EXPECT_NEAR(air[2], 9 * std::numbers::pi_v<float>, 0.005f * air[2]);
 }
 
 TEST(CInterface, TheExampleOfTheDocumentation) {

@@ -64,7 +64,7 @@ typedef struct dimmer_pack_info {
     dimmer_color_format color_format;             /* of the irradiance pages; direction is A2B10G10R10_UNORM_PACK32 */
     dimmer_direction_model direction_model;       /* as sample.glsl wants it */
     float exposure;                               /* stored light = lux * exposure; a power of two */
-    uint32_t element_count, mesh_count, viewpoint_count;
+    uint32_t element_count, mesh_count, viewpoint_count, model_count, model_mesh_count;
 } dimmer_pack_info;
 
 dimmer_result dimmer_pack_get_info(const dimmer_pack* pack, dimmer_pack_info* info);
@@ -115,12 +115,53 @@ typedef struct dimmer_viewpoint {
 
 dimmer_result dimmer_pack_get_viewpoint(const dimmer_pack* pack, uint32_t index, dimmer_viewpoint* viewpoint);
 
+/* Where a model's probes are, and how to find them: what grid.glsl's dimmer_model_irradiance takes. */
+typedef struct dimmer_model_slot {
+    uint32_t first_probe;
+    uint32_t counts[3];          /* along each axis; x fastest, then y */
+    float grid_from_world[3][4]; /* to 0 .. counts - 1 along each axis */
+} dimmer_model_slot;
+
+/* A thing of the level that light grids light. */
+typedef struct dimmer_placed_model {
+    const char* node;                /* pointers live as long as the pack */
+    uint32_t first_mesh, mesh_count; /* model meshes; none: a place for things that move */
+    int moves;                       /* 0: it stands, and `slot` says where its probes are; else add it to the lights */
+    dimmer_model_slot slot;
+    float world_from_model[12]; /* rows of a rigid 3 x 4 matrix, metres, the translation last */
+    float min_m[3], max_m[3];   /* its box, model space */
+} dimmer_placed_model;
+
+dimmer_result dimmer_pack_get_model(const dimmer_pack* pack, uint32_t index, dimmer_placed_model* model);
+
+/* 20 bytes that a vertex buffer takes as they are; model_mesh.h has the formulas. */
+typedef struct dimmer_model_vertex {
+    uint16_t position[3]; /* UNORM, over the mesh's box */
+    int16_t normal[2];    /* SNORM, octahedral */
+    int8_t transfer[9];   /* SNORM, in units of the bands' bounds: self-visibility */
+    uint8_t spare;
+} dimmer_model_vertex;
+
+typedef struct dimmer_model_mesh {
+    const dimmer_model_vertex* vertices;
+    const uint32_t* indices; /* 3 per triangle */
+    uint32_t vertex_count, index_count;
+    float min_m[3], max_m[3]; /* of its positions, model space */
+    float reflectance[3];
+    float emission_cd_m2[3];
+    uint32_t emission_set; /* the element that dims the emission, or DIMMER_NONE */
+} dimmer_model_mesh;
+
+dimmer_result dimmer_pack_get_model_mesh(const dimmer_pack* pack, uint32_t index, dimmer_model_mesh* mesh);
+
 /* ---- Lights: the weights of a level's light sets and doors, and the pages blended from them. ---- */
 
 typedef struct dimmer_lights dimmer_lights;
 
-/* On the CPU, with `thread_count` threads (1 or more, the caller's included). Keeps what it needs of the pack alive. */
-dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, dimmer_lights** lights);
+/* On the CPU, with `thread_count` threads (1 or more, the caller's included) and room for `moving_probes_max` probes of
+ * models that move (28 bytes each). Keeps what it needs of the pack alive. */
+dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
+                                       dimmer_lights** lights);
 /* Null is allowed. Waits for what dimmer_lights_submit() sent; what was recorded must have completed. */
 void dimmer_lights_destroy(dimmer_lights* lights);
 
@@ -161,6 +202,46 @@ dimmer_result dimmer_sample_lightmap(const dimmer_pack* pack, const uint32_t* ir
                                      size_t texel_count, uint32_t page, const float uv[2],
                                      const float normal_tangent[3], float lux[3]);
 
+/* ---- Light grids: things that move, and points in the air. ---- */
+
+/* A lattice of probes that fills a box in the model's space, its corners included; 1 to 64 probes along each axis. */
+typedef struct dimmer_model_grid {
+    float min_m[3], max_m[3];
+    uint32_t counts[3];
+} dimmer_model_grid;
+
+/* Handles of removed models are refused, not mistaken for later ones. */
+typedef struct dimmer_model {
+    uint32_t index, generation;
+} dimmer_model;
+
+/* The next update takes the model's probes from the level's global grid, and again whenever it moved or the light
+ * around it changed. `world_from_model`: as of dimmer_placed_model. DIMMER_OUT_OF_MEMORY where moving_probes_max is
+ * reached. */
+dimmer_result dimmer_lights_add_model(dimmer_lights* lights, const dimmer_model_grid* grid,
+                                      const float world_from_model[12], dimmer_model* model);
+dimmer_result dimmer_lights_move_model(dimmer_lights* lights, dimmer_model model, const float world_from_model[12]);
+dimmer_result dimmer_lights_remove_model(dimmer_lights* lights, dimmer_model model);
+/* For shading; changes with the transform alone. */
+dimmer_result dimmer_lights_get_model_slot(const dimmer_lights* lights, dimmer_model model, dimmer_model_slot* slot);
+
+/* Lights on the CPU alone: the blended probes, 7 words each, those of models behind the pack's, for as long as the
+ * lights live; updates change them in place. */
+dimmer_result dimmer_lights_get_probes(const dimmer_lights* lights, const uint32_t** probes, size_t* word_count);
+
+/* Light at a point of the air, from probes as above: irradiance in lux on a surface with this unit normal, or radiance
+ * in cd/m2, 9 coefficients of real spherical harmonics (probe_grid.h), r g b each. `hint` may be null; with the last
+ * query's answer in it (DIMMER_NONE at first, one per thread) a query nearby is faster. Outside of the level: the light
+ * of the grid's nearest point; without a global grid: black. Any thread, while nothing updates the probes. */
+dimmer_result dimmer_sample_air(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
+                                const float point_m[3], const float normal[3], uint32_t* hint, float lux[3]);
+dimmer_result dimmer_sample_radiance(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
+                                     const float point_m[3], uint32_t* hint, float radiance[27]);
+/* The same on a model, that moves or stands, from its own probes. */
+dimmer_result dimmer_sample_model(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
+                                  const dimmer_model_slot* slot, const float point_m[3], const float normal[3],
+                                  float lux[3]);
+
 #ifndef DIMMER_NO_VULKAN
 
 /* The caller's device: Vulkan 1.2 with timelineSemaphore, and a queue with compute. It must outlive the lights. */
@@ -180,7 +261,8 @@ typedef enum dimmer_buffering {
 } dimmer_buffering;
 
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
-                                          dimmer_buffering buffering, dimmer_lights** lights);
+                                          dimmer_buffering buffering, uint32_t moving_probes_max,
+                                          dimmer_lights** lights);
 
 /* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
 
@@ -205,6 +287,10 @@ typedef struct dimmer_images {
     VkSampler sampler; /* bilinear, clamp to edge */
     uint32_t width, height, layers;
 } dimmer_images;
+
+/* Storage buffers for grid.glsl: the probes that go with the last update, models' behind the pack's, and the global
+ * grid's tables; VK_NULL_HANDLE where there are none. With DIMMER_DOUBLE_BUFFERED, ask after each update. */
+dimmer_result dimmer_lights_get_probe_buffers(const dimmer_lights* lights, VkBuffer* probes, VkBuffer* grid_table);
 
 /* What to sample after the last update; with DIMMER_DOUBLE_BUFFERED, ask after each. */
 dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images);
