@@ -438,17 +438,24 @@ VIEWS = {
 }
 
 
+# Around Y, from east to north.
+def turned(degrees):
+    half = math.radians(degrees) / 2
+    return [0, round(math.sin(half), 7), 0, round(math.cos(half), 7)]
+
+
+# The sample flies a ball from each place in its direction, and back.
 def add_places(gltf):
     for name, view in VIEWS.items():
         gltf.camera(name, *view)
     gltf.node("player_start", translation=[6.1, 1.65, 7.6], rotation=look_along((0, 0, -1)))
-    for name, place in {
-        "guest_living": (2.4, 1.0, 5.2),
-        "guest_hall": (6.1, 1.0, 5.6),
-        "guest_corridor": (9.0, 1.0, 0.9),
-        "guest_landing": (6.0, 3.8, 3.0),
+    for name, (place, degrees) in {
+        "guest_living": ((2.4, 1.0, 5.2), 0),
+        "guest_hall": ((6.1, 1.0, 5.6), 90),
+        "guest_corridor": ((9.0, 1.0, 0.9), 180),
+        "guest_landing": ((6.0, 3.8, 3.0), 0),
     }.items():
-        gltf.node(name, {"dimmer_dynamic": 1}, translation=list(place))
+        gltf.node(name, {"dimmer_dynamic": 1}, translation=list(place), rotation=turned(degrees))
 
 
 # ---------------------------------------------------------------------------------------------------- the level
@@ -483,7 +490,7 @@ GRID_LIT = {
     "coffee_table", "dining_table", "dining_chair_1", "dining_chair_2", "dining_chair_3", "dining_chair_4",
     "hall_bench", "cellar_crates", "den_chair", "study_chair",
 }  # fmt: skip
-# name: place and the direction in which the sample flies there and back, degrees from east to north
+# name: place and direction, as in add_places
 MORE_GUESTS = {
     "guest_sofa": ((1.2, 1.6, 6.6), 60),
     "guest_lamp": ((1.5, 0.9, 7.0), 90),
@@ -505,9 +512,8 @@ def in_the_demo(node):
 def more_guests():
     nodes = []
     for name, (place, degrees) in MORE_GUESTS.items():
-        half = math.radians(degrees) / 2
-        turn = [0, round(math.sin(half), 7), 0, round(math.cos(half), 7)]
-        nodes.append({"name": name, "translation": list(place), "rotation": turn, "extras": {"dimmer_dynamic": 1}})
+        nodes.append({"name": name, "translation": list(place), "rotation": turned(degrees),
+                      "extras": {"dimmer_dynamic": 1}})
     return nodes
 
 
