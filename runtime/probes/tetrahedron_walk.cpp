@@ -99,11 +99,17 @@ GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t 
     GridPlace place;
     place.tetrahedron = hint;
     const bool hinted = hint < grid.tetrahedra.size();
-    if (!hinted || !walk(grid, point, hinted_steps_max, place)) {
+    bool found = hinted && walk(grid, point, hinted_steps_max, place);
+    if (found) {
+        settle(grid, point, place);
+        // At a face the hint would still have a say, where many tetrahedra meet.
+        found = place.barycentric[smallest(place.barycentric)] > inside_tolerance;
+    }
+    if (!found) {
         place.tetrahedron = startOf(grid, point);
         walk(grid, point, walk_steps_max, place);
+        settle(grid, point, place);
     }
-    settle(grid, point, place);
     place.barycentric = clampWeights(place.barycentric);
     return place;
 }

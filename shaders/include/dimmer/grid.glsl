@@ -117,11 +117,17 @@ DimmerGridPlace dimmer_locate(vec3 point, uint hint) {
     for (int i = 0; i < 3; ++i) point[i] = point[i] > low[i] ? (point[i] < high[i] ? point[i] : high[i]) : low[i];
     DimmerGridPlace place = DimmerGridPlace(hint, vec4(0));
     bool hinted = hint < DIMMER_GRID_WORDS(3).y;
-    if (!hinted || !dimmer_walk(point, dimmer_hinted_steps_max, place)) {
+    bool found = hinted && dimmer_walk(point, dimmer_hinted_steps_max, place);
+    if (found) {
+        dimmer_settle(point, place);
+        // At a face the hint would still have a say, where many tetrahedra meet.
+        found = place.barycentric[dimmer_smallest(place.barycentric)] > dimmer_inside_tolerance;
+    }
+    if (!found) {
         place.tetrahedron = dimmer_start(point, low, high);
         dimmer_walk(point, dimmer_walk_steps_max, place);
+        dimmer_settle(point, place);
     }
-    dimmer_settle(point, place);
     precise vec4 weights;
     for (int i = 0; i < 4; ++i) {
         float w = place.barycentric[i];
