@@ -16,7 +16,7 @@ inline constexpr uint32_t hinted_steps_max = 32, walk_steps_max = 1024;
 // the light jumps by at most this share where two tetrahedra disagree.
 inline constexpr float inside_tolerance = 1e-4f;
 // So near to a face, neighbours are compared: of those that take a point in, the one that it is deepest in gives the
-// light, whatever the hint was. Round an edge there are many; a few steps settle all but the rarest of places.
+// light. Round an edge there are many, and a few steps need not find it: there, a walk ignores its hint.
 inline constexpr uint32_t settle_steps_max = 4;
 // Visible light fades in over 1 / this of the field's range, on the visible side: a plane through the open air shows
 // no edge, and nothing shines past it.
