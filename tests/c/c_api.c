@@ -143,10 +143,10 @@ int light_a_model(const char* path, float before_lux[3], float after_lux[3], flo
     int i;
     EXPECT_OK(dimmer_pack_open(path, &pack));
     EXPECT_OK(dimmer_lights_create_cpu(pack, 1, 8, &lights));
-    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "", dimmer_lights_add_model(lights, &grid, flat, &model));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "transform", dimmer_lights_add_model(lights, &grid, flat, &model));
     EXPECT(model.index == 77);
     EXPECT_OK(dimmer_lights_add_model(lights, &grid, here, &model));
-    EXPECT_FAILURE(DIMMER_OUT_OF_MEMORY, "", dimmer_lights_add_model(lights, &grid, here, &second));
+    EXPECT_FAILURE(DIMMER_OUT_OF_MEMORY, "probes", dimmer_lights_add_model(lights, &grid, here, &second));
     EXPECT_OK(dimmer_lights_update(lights, NULL));
     EXPECT_OK(dimmer_lights_get_probes(lights, &probes, &words));
     EXPECT_OK(dimmer_lights_get_model_slot(lights, model, &slot));
@@ -162,7 +162,7 @@ int light_a_model(const char* path, float before_lux[3], float after_lux[3], flo
     EXPECT_OK(dimmer_sample_air(pack, probes, words, later, up, &hint, air_lux));
     EXPECT(hint != DIMMER_NONE);
     EXPECT_OK(dimmer_sample_radiance(pack, probes, words, later, NULL, radiance));
-    /* Light from everywhere: E = pi L, and L Y_00 = L_00 / (4 pi). */
+    /* Light L from everywhere: L_00 = sqrt(4 pi) L, and E = pi L = sqrt(pi) / 2 L_00. */
     EXPECT(fabsf(radiance[0] * 0.886226925f - air_lux[0]) < 1e-4f * air_lux[0]);
     for (i = 3; i < 27; ++i) EXPECT(radiance[i] == 0);
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "words", dimmer_sample_air(pack, probes, 7, later, up, NULL, air_lux));
