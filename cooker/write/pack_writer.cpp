@@ -3,6 +3,7 @@
 #include <format/byte_stream.h>
 #include <format/hash.h>
 #include <format/layout.h>
+#include <pack/stored_tables.h>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -30,9 +31,7 @@ class Writer {
         addTable(ChunkType::Elements, [&](ByteWriter& out) { putElements(out); });
         addTable(ChunkType::Contributions, [&](ByteWriter& out) { putContributions(out); });
         addArray(ChunkType::BasePages, std::span(d_.base_pages));
-        addArray(ChunkType::Clusters, std::span(d_.clusters));
-        addArray(ChunkType::Terms, std::span(d_.terms));
-        addArray(ChunkType::Batches, std::span(d_.batches));
+        addTables({ChunkType::Clusters, ChunkType::Terms, ChunkType::Batches}, d_.texelView());
         addArray(ChunkType::Addresses, std::span(d_.addresses));
         size_t first = 0;
         for (uint32_t k = 0; k < d_.contributions.size(); ++k) {
@@ -52,7 +51,7 @@ class Writer {
    private:
     // Chunks are compressed together at the end, on all threads: the larger part of writing a pack.
     struct Content {
-        std::vector<std::byte> own;  // of tables
+        std::vector<std::byte> own;  // of what is not in PackData as the file has it
         std::span<const std::byte> bytes;
     };
 
@@ -92,17 +91,32 @@ class Writer {
         add(type, subject, {{}, std::as_bytes(values)}, sizeof(T));
     }
 
+    template <class T>
+    void addArray(ChunkType type, std::vector<T>&& values) {
+        const auto bytes = std::as_bytes(std::span(values));
+        Content content{{bytes.begin(), bytes.end()}, {}};
+        content.bytes = content.own;
+        add(type, 0, std::move(content), sizeof(T));
+    }
+
+    void addTables(const std::array<ChunkType, 3>& types, const ReceiverView& tables) {
+        StoredTables stored = storedTables(tables);
+        addArray(types[0], std::move(stored.clusters));
+        addArray(types[1], std::move(stored.terms));
+        addArray(types[2], std::move(stored.batches));
+    }
+
     void addProbes(const ProbeData& probes) {
         addArray(ChunkType::ProbeBase, std::span(probes.base));
-        addArray(ChunkType::ProbeClusters, std::span(probes.clusters));
-        addArray(ChunkType::ProbeTerms, std::span(probes.terms));
-        addArray(ChunkType::ProbeBatches, std::span(probes.batches));
+        addTables({ChunkType::ProbeClusters, ChunkType::ProbeTerms, ChunkType::ProbeBatches}, probes.view());
         addArray(ChunkType::ProbeNumbers, std::span(probes.numbers));
         addArray(ChunkType::ProbeCounts, std::span(probes.record_counts));
         addArray(ChunkType::ProbePayload, std::span(probes.payload));
         addArray(ChunkType::GridPositions, std::span(probes.global.positions));
         addArray(ChunkType::GridLevels, std::span(probes.global.levels));
-        addArray(ChunkType::GridTetrahedra, std::span(probes.global.tetrahedra));
+        std::vector<std::array<uint32_t, 4>> corners;
+        for (const Tetrahedron& t : probes.global.tetrahedra) corners.push_back(t.probes);
+        addArray(ChunkType::GridTetrahedra, std::move(corners));
         addArray(ChunkType::GridVisibility, std::span(probes.global.visibility));
         addArray(ChunkType::GridStarts, std::span(probes.global.starts));
         addTable(ChunkType::GridBox, [&](ByteWriter& out) { out.put(probes.global.start); });

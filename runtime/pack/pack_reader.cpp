@@ -6,6 +6,7 @@
 
 #include <pack/decompress.h>
 #include <pack/mesh_codec.h>
+#include <pack/stored_tables.h>
 
 #include <fmt/format.h>
 
@@ -66,9 +67,7 @@ class Reader {
         then([&] { return table(ChunkType::Elements, [&](ByteReader& in) { readElements(in, d); }); });
         then([&] { return table(ChunkType::Contributions, [&](ByteReader& in) { readContributions(in, d); }); });
         then([&] { return array(ChunkType::BasePages, d.base_pages); });
-        then([&] { return array(ChunkType::Clusters, d.clusters); });
-        then([&] { return array(ChunkType::Terms, d.terms); });
-        then([&] { return array(ChunkType::Batches, d.batches); });
+        then([&] { return readTexelTables(d); });
         then([&] { return array(ChunkType::Addresses, d.addresses); });
         then([&] { return readPayload(d); });
         then([&] { return readProbes(d); });
@@ -209,6 +208,37 @@ class Reader {
         return {};
     }
 
+    Expected<ReceiverTables> receiverTables(const std::array<ChunkType, 3>& types,
+                                            std::span<const uint32_t> record_counts) {
+        StoredTables stored;
+        Expected<void> ok = array(types[0], stored.clusters);
+        if (ok) ok = array(types[1], stored.terms);
+        if (ok) ok = array(types[2], stored.batches);
+        if (!ok) return std::unexpected(ok.error());
+        return restored(stored, record_counts);
+    }
+
+    Expected<void> readTexelTables(PackData& d) {
+        std::vector<uint32_t> record_counts;
+        for (const Contribution& c : d.contributions) record_counts.push_back(c.receivers);
+        auto tables = receiverTables({ChunkType::Clusters, ChunkType::Terms, ChunkType::Batches}, record_counts);
+        if (!tables) return std::unexpected(tables.error());
+        d.clusters = std::move(tables->clusters);
+        d.terms = std::move(tables->terms);
+        d.batches = std::move(tables->batches);
+        return {};
+    }
+
+    Expected<void> readProbeTables(ProbeData& probes) {
+        auto tables = receiverTables({ChunkType::ProbeClusters, ChunkType::ProbeTerms, ChunkType::ProbeBatches},
+                                     probes.record_counts);
+        if (!tables) return std::unexpected(tables.error());
+        probes.clusters = std::move(tables->clusters);
+        probes.terms = std::move(tables->terms);
+        probes.batches = std::move(tables->batches);
+        return {};
+    }
+
     Expected<void> readPayload(PackData& d) {
         for (uint32_t k = 0; k < d.contributions.size(); ++k) {
             const size_t before = d.payload.size();
@@ -223,11 +253,9 @@ class Reader {
     Expected<void> readProbes(PackData& d) {
         if (!by_name_.contains({static_cast<uint32_t>(ChunkType::ProbeBase), 0})) return {};
         Expected<void> ok = array(ChunkType::ProbeBase, d.probes.base);
-        if (ok) ok = array(ChunkType::ProbeClusters, d.probes.clusters);
-        if (ok) ok = array(ChunkType::ProbeTerms, d.probes.terms);
-        if (ok) ok = array(ChunkType::ProbeBatches, d.probes.batches);
-        if (ok) ok = array(ChunkType::ProbeNumbers, d.probes.numbers);
         if (ok) ok = array(ChunkType::ProbeCounts, d.probes.record_counts);
+        if (ok) ok = readProbeTables(d.probes);
+        if (ok) ok = array(ChunkType::ProbeNumbers, d.probes.numbers);
         if (ok) ok = array(ChunkType::ProbePayload, d.probes.payload);
         if (ok) ok = readGlobalGrid(d.probes.global);
         if (ok) ok = table(ChunkType::LocalGrids, [&](ByteReader& in) { readLocalGrids(in, d); });
@@ -237,11 +265,21 @@ class Reader {
     Expected<void> readGlobalGrid(GlobalGrid& grid) {
         Expected<void> ok = array(ChunkType::GridPositions, grid.positions);
         if (ok) ok = array(ChunkType::GridLevels, grid.levels);
-        if (ok) ok = array(ChunkType::GridTetrahedra, grid.tetrahedra);
+        if (ok) ok = readTetrahedra(grid);
         if (ok) ok = array(ChunkType::GridVisibility, grid.visibility);
         if (ok) ok = array(ChunkType::GridStarts, grid.starts);
         if (ok) ok = table(ChunkType::GridBox, [&](ByteReader& in) { grid.start = in.get<StartGrid>(); });
         return ok;
+    }
+
+    Expected<void> readTetrahedra(GlobalGrid& grid) {
+        std::vector<std::array<uint32_t, 4>> corners;
+        if (auto ok = array(ChunkType::GridTetrahedra, corners); !ok) return ok;
+        for (const auto& probes : corners) grid.tetrahedra.push_back({.probes = probes});
+        if (!joinFaces(grid.tetrahedra, grid.positions.size()))
+            return bad("chunk {} names probes that are not there, or three tetrahedra share a face",
+                       name(ChunkType::GridTetrahedra));
+        return {};
     }
 
     static void readLocalGrids(ByteReader& in, PackData& d) {

@@ -209,10 +209,12 @@ TEST(PackLayout, TablesAndArrays) {
     EXPECT_EQ(elements.read<float>(16), 2.0f);
     EXPECT_EQ(file.chunk("BASE").shuffle, 8u);
     EXPECT_EQ(file.chunk("BASE").bytes.size(), data.base_pages.size() * 8);
-    EXPECT_EQ(file.chunk("CLUS").bytes.size(), data.clusters.size() * 24);
-    EXPECT_EQ(file.chunk("CLUS").read<uint32_t>(24), data.clusters[1].first_receiver);
-    EXPECT_EQ(file.chunk("TERM").bytes.size(), data.terms.size() * 8);
-    EXPECT_EQ(file.chunk("BTCH").bytes.size(), data.batches.size() * 8);
+    EXPECT_EQ(file.chunk("CLUS").bytes.size(), data.clusters.size() * 12);
+    EXPECT_EQ(file.chunk("CLUS").read<uint32_t>(12), data.clusters[1].receiver_count);
+    EXPECT_EQ(file.chunk("TERM").bytes.size(), data.terms.size() * 4);
+    EXPECT_EQ(file.chunk("TERM").read<uint32_t>(4), data.terms[1].contribution);
+    EXPECT_EQ(file.chunk("BTCH").bytes.size(), data.batches.size() * 4);
+    EXPECT_EQ(file.chunk("BTCH").read<uint32_t>(4), data.batches[1].receiver_count);
     EXPECT_EQ(file.chunk("ADDR").bytes.size(), data.addresses.size() * 4);
     size_t first = 0;
     for (uint32_t k = 0; k < data.contributions.size(); ++k) {

@@ -124,6 +124,29 @@ TEST(GridPack, AllChunksOrNone) {
     }
 }
 
+// The file lists a tetrahedron's probes; who borders on whom is found when it is read (GridPack.EveryFieldComesBack
+// compares that with TetGen's neighbours).
+TEST(GridPack, TetrahedraThatNobodyCanJoinAreRefused) {
+    const PackFile whole(cook::packBytes(gridPack()));
+    const std::vector<std::function<void(ChunkContent&)>> faults = {
+        [](ChunkContent& c) { c.write(0, 50u); },
+        [](ChunkContent& c) { c.write(8, UINT32_MAX); },
+        [](ChunkContent& c) { c.bytes.resize(c.bytes.size() - 4); },
+        // The first one three times.
+        [](ChunkContent& c) {
+            for (size_t byte = 0; byte < 32; ++byte) c.bytes[16 + byte] = c.bytes[byte % 16];
+        },
+    };
+    for (const auto& fault : faults) {
+        PackFile file = whole;
+        fault(file.chunk("GTET"));
+        const auto pack = Pack::fromBytes(file.bytes(), "test");
+        ASSERT_FALSE(pack);
+        EXPECT_EQ(pack.error().code, ErrorCode::BadInput);
+        EXPECT_THAT(pack.error().message, testing::HasSubstr("chunk GTET"));
+    }
+}
+
 std::vector<uint32_t> words(const PackData& data) {
     std::vector<uint32_t> out;
     for (const ProbeRecord& probe : data.probes.base) {
