@@ -106,11 +106,12 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     std::map<std::string, json> values;
     flatten(*root, "", values);
     const auto lines = linesOfKeys(source.text);
+    const auto settings = settingsOf(profile);
     for (const auto& [key, value] : values) {
         if (key == "extends" || key == "description" || key == "$schema") continue;
         const auto line = lines.find(key);
         const std::string place = line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
-        if (auto ok = assignSetting(profile, key, value, "profile " + place); !ok) return ok;
+        if (auto ok = assignSetting(profile, settings, key, value, "profile " + place); !ok) return ok;
         profile.origin[key] = source.origin;
     }
     return {};
@@ -171,7 +172,7 @@ Expected<CookSettings> readSettings(const std::string& settings_json) {
         if (key == "quality" && value.is_string()) out.quality = value.get<std::string>();
         const bool known = std::ranges::find(settings, key, &Setting::key) != settings.end();
         if (!known && !key.starts_with(set_threshold_prefix)) continue;
-        if (auto ok = assignSetting(out.profile, key, value, "profile " + source); !ok)
+        if (auto ok = assignSetting(out.profile, settings, key, value, "profile " + source); !ok)
             return std::unexpected(ok.error());
     }
     if (!out.profile.quality(out.quality))

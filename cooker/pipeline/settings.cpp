@@ -198,7 +198,8 @@ std::vector<Setting> settingsOf(Profile& p) {
     return list;
 }
 
-Expected<void> assignSetting(Profile& profile, const std::string& key, const json& value, const std::string& source) {
+Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& settings, const std::string& key,
+                             const json& value, const std::string& source) {
     if (key.starts_with(set_threshold_prefix) && key.size() > set_threshold_prefix.size()) {
         const std::string set = key.substr(set_threshold_prefix.size());
         float threshold = 0;
@@ -206,7 +207,6 @@ Expected<void> assignSetting(Profile& profile, const std::string& key, const jso
         profile.set_thresholds[set] = threshold;
         return {};
     }
-    const auto settings = settingsOf(profile);
     const auto it = std::ranges::find(settings, key, &Setting::key);
     if (it == settings.end()) return bad(source, unknownKey(key, value, settings));
     return assign(*it, value, source);
@@ -220,7 +220,7 @@ Expected<void> assignText(Profile& profile, const std::string& text, const std::
     const std::string key = text.substr(0, equals), written = text.substr(equals + 1);
     json value = json::parse(written, nullptr, false);
     if (value.is_discarded() || !value.is_primitive()) value = written;
-    if (auto ok = assignSetting(profile, key, value, source); !ok) return ok;
+    if (auto ok = assignSetting(profile, settingsOf(profile), key, value, source); !ok) return ok;
     profile.origin[key] = origin;
     return {};
 }

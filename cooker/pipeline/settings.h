@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -16,7 +17,7 @@ struct Setting {
     std::string key;  // dotted: "lightmaps.page_size"
     std::variant<uint64_t*, uint32_t*, float*, ColorFormat*, DirectionModel*, GridMode*> target;
     double least = 0, most = 0;  // of a number
-    std::string what;            // with its unit, and why one would change it
+    std::string_view what;       // with its unit, and why one would change it
 };
 
 // Those of `profile`, whose members the targets point into.
@@ -25,9 +26,10 @@ std::vector<Setting> settingsOf(Profile& profile);
 // "records.thresholds.NAME" is a setting for every light set.
 inline constexpr std::string_view set_threshold_prefix = "records.thresholds.";
 
-// Sets one. `source` begins error messages: "profile mine.json:3", "--set", "the level's 'dimmer_settings'".
-Expected<void> assignSetting(Profile& profile, const std::string& key, const nlohmann::json& value,
-                             const std::string& source);
+// Sets one; `settings` are settingsOf(profile). `source` begins error messages: "profile mine.json:3", "--set", "the
+// level's 'dimmer_settings'".
+Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& settings, const std::string& key,
+                             const nlohmann::json& value, const std::string& source);
 
 // "key=value" as on the command line; numbers and names need no quotes.
 Expected<void> assignText(Profile& profile, const std::string& text, const std::string& source,
