@@ -2,38 +2,40 @@
 
 #include <algorithm>
 #include <array>
-#include <tuple>
+#include <utility>
 
 namespace dimmer {
 namespace {
 
-// A tetrahedron's side, filed under the lowest of its probes.
+// A side of a tetrahedron, filed under the lowest of its probes.
 struct Face {
-    uint32_t middle, highest;  // the other two
+    uint64_t others;  // the other two, the middle one first
     uint32_t tetrahedron, opposite;
-    auto probes() const { return std::tie(middle, highest); }
 };
 
-std::array<uint32_t, 3> faceOf(const Tetrahedron& t, uint32_t opposite) {
-    std::array<uint32_t, 3> face;
-    for (uint32_t i = 0, n = 0; i < 4; ++i)
-        if (i != opposite) face[n++] = t.probes[i];
-    std::ranges::sort(face);
-    return face;
+// Calls visit(lowest probe, face) for the four sides.
+void visitFaces(const Tetrahedron& t, uint32_t number, auto&& visit) {
+    std::array<uint32_t, 4> order = {0, 1, 2, 3};
+    auto ascend = [&](size_t a, size_t b) {
+        if (t.probes[order[b]] < t.probes[order[a]]) std::swap(order[a], order[b]);
+    };
+    ascend(0, 1), ascend(2, 3), ascend(0, 2), ascend(1, 3), ascend(1, 2);
+    const uint64_t a = t.probes[order[0]], b = t.probes[order[1]], c = t.probes[order[2]], d = t.probes[order[3]];
+    visit(b, Face{c << 32 | d, number, order[0]});
+    visit(a, Face{c << 32 | d, number, order[1]});
+    visit(a, Face{b << 32 | d, number, order[2]});
+    visit(a, Face{b << 32 | c, number, order[3]});
 }
 
 // A counting sort: the faces of one lowest probe stand together, those of probe p from first[p] on.
 std::vector<Face> facesByLowestProbe(std::span<const Tetrahedron> tetrahedra, std::vector<size_t>& first) {
     for (const Tetrahedron& t : tetrahedra)
-        for (uint32_t side = 0; side < 4; ++side) ++first[faceOf(t, side)[0] + 1];
+        visitFaces(t, 0, [&](uint64_t lowest, const Face&) { ++first[lowest + 1]; });
     for (size_t p = 1; p < first.size(); ++p) first[p] += first[p - 1];
     std::vector<size_t> next(first.begin(), first.end());
     std::vector<Face> faces(4 * tetrahedra.size());
-    for (uint32_t t = 0; t < tetrahedra.size(); ++t)
-        for (uint32_t side = 0; side < 4; ++side) {
-            const auto face = faceOf(tetrahedra[t], side);
-            faces[next[face[0]]++] = {face[1], face[2], t, side};
-        }
+    for (uint32_t i = 0; i < tetrahedra.size(); ++i)
+        visitFaces(tetrahedra[i], i, [&](uint64_t lowest, const Face& face) { faces[next[lowest]++] = face; });
     return faces;
 }
 
@@ -87,11 +89,11 @@ bool joinFaces(std::span<Tetrahedron> tetrahedra, size_t probe_count) {
     std::vector<Face> faces = facesByLowestProbe(tetrahedra, first);
     for (size_t p = 0; p < probe_count; ++p) {
         const auto here = std::span(faces).subspan(first[p], first[p + 1] - first[p]);
-        std::ranges::sort(here, {}, &Face::probes);
+        std::ranges::sort(here, {}, &Face::others);
         for (size_t i = 1; i < here.size(); ++i) {
             const Face &a = here[i - 1], &b = here[i];
-            if (a.probes() != b.probes()) continue;
-            if (i > 1 && here[i - 2].probes() == a.probes()) return false;
+            if (a.others != b.others) continue;
+            if (i > 1 && here[i - 2].others == a.others) return false;
             tetrahedra[a.tetrahedron].neighbours[a.opposite] = b.tetrahedron;
             tetrahedra[b.tetrahedron].neighbours[b.opposite] = a.tetrahedron;
         }
