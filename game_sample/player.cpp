@@ -131,12 +131,13 @@ class Player {
     Timeline timeline_;
 };
 
-// Every weight as it was at the beginning: sets at 1, doors closed.
+// Every weight as it was at the beginning: sets at 1 or their maximum, doors closed.
 Expected<void> resetWeights(Runtime& lights) {
     const auto elements = lights.pack().elements();
     for (uint32_t i = 0; i < elements.size(); ++i) {
         const bool is_door = elements[i].kind == ElementKind::Door;
-        DIMMER_TRY(is_door ? lights.setDoor(Door{i}, 0) : lights.setWeight(LightSet{i}, 1));
+        const float shining = std::min(1.0f, elements[i].max_weight);
+        DIMMER_TRY(is_door ? lights.setDoor(Door{i}, 0) : lights.setWeight(LightSet{i}, shining));
     }
     return {};
 }

@@ -72,11 +72,11 @@ void addSampleCommand(CLI::App& app, int& exit_code) {
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--points", a->points, "CSV with the header x,y,z,nx,ny,nz (metres, glTF axes); - for stdin")
         ->required();
-    c->add_option(
-        "--state", a->state,
-        "weights: a light set's name = scalar or r/g/b (1: as baked), door:NAME = 0 closed .. 1 open; e.g. "
-        "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1, doors 0. all=0 turns every set "
-        "off first");
+    c->add_option("--state", a->state,
+                  "weights: a light set's name = scalar or r/g/b (1: as baked), door:NAME = 0 closed .. 1 open; e.g. "
+                  "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1 (or their maximum), doors 0. "
+                  "all=0 turns every set "
+                  "off first");
     c->add_option("--from", a->from,
                   "surface: the lightmap at the nearest surface within 10 cm; grid: the light probes, anywhere")
         ->check(CLI::IsMember({"surface", "grid"}))

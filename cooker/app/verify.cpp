@@ -139,7 +139,8 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
     c->add_option("LEVEL", a->level, "the level that the pack was cooked from")->required();
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--state", a->options.state,
-                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1, doors 0; a door "
+                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (or their "
+                  "maximum), doors 0; a door "
                   "is 0 or 1");
     c->add_option("--points", a->options.points, "random places on lightmapped surfaces")
         ->check(CLI::Range(1u, 1000000u))

@@ -43,7 +43,10 @@ using namespace dimmer::c;
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights) {
     if (!given(pack, lights)) return DIMMER_INVALID_ARGUMENT;
-    if (thread_count == 0) return report(ErrorCode::InvalidArgument, "lights on the CPU need one thread at least");
+    constexpr uint32_t threads_max = 1024;
+    if (thread_count == 0 || thread_count > threads_max)
+        return report({ErrorCode::InvalidArgument,
+                       fmt::format("lights on the CPU run on 1 to {} threads, not {}", threads_max, thread_count)});
     return guarded([&] {
         *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count, moving_probes_max)};
         return DIMMER_OK;
@@ -153,11 +156,26 @@ dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer comman
     });
 }
 
-dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats) {
+dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights) {
     if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         auto* runtime = runtimeAs<Runtime>(lights);
-        return runtime ? finish(runtime->submit(), stats) : DIMMER_UNSUPPORTED;
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        runtime->discardRecorded();
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats) {
+    return dimmer_lights_submit_after(lights, VK_NULL_HANDLE, 0, stats);
+}
+
+dimmer_result dimmer_lights_submit_after(dimmer_lights* lights, VkSemaphore semaphore, uint64_t value,
+                                         dimmer_update_stats* stats) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = runtimeAs<Runtime>(lights);
+        return runtime ? finish(runtime->submit({semaphore, value}), stats) : DIMMER_UNSUPPORTED;
     });
 }
 

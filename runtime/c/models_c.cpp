@@ -29,7 +29,8 @@ Transform transformOf(const float world_from_model[12]) {
 constexpr size_t words_of_probe = sizeof(ProbeRecord) / sizeof(uint32_t);
 
 // Whether `word_count` words hold probes 0 .. probes - 1; reports it otherwise.
-bool holds(size_t word_count, uint64_t probes) {
+bool holds(const uint32_t* words, size_t word_count, uint64_t probes) {
+    if (probes > 0 && !given(words)) return false;
     if (word_count / words_of_probe >= probes) return true;
     report({ErrorCode::InvalidArgument,
             fmt::format("{} words of probes were passed, {} are needed", word_count, probes * words_of_probe)});
@@ -94,7 +95,7 @@ dimmer_result dimmer_lights_get_probe_buffers(const dimmer_lights* lights, VkBuf
     return guarded([&] {
         const auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
-        *probes = runtime->probes(runtime->pageSet());
+        *probes = runtime->probes(runtime->probeSet());
         *grid_table = runtime->gridTable();
         return DIMMER_OK;
     });
@@ -104,7 +105,8 @@ dimmer_result dimmer_sample_radiance(const dimmer_pack* pack, const uint32_t* pr
                                      const float point_m[3], uint32_t* hint, float radiance[27]) {
     if (!given(pack, point_m, radiance)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        if (!holds(word_count, pack->pack.data().probes.global.positions.size())) return DIMMER_INVALID_ARGUMENT;
+        if (!holds(probes, word_count, pack->pack.data().probes.global.positions.size()))
+            return DIMMER_INVALID_ARGUMENT;
         GridHint near{hint ? *hint : DIMMER_NONE};
         const Radiance found = GridSampler(pack->pack, {probes, word_count}).radiance(vec3(point_m), &near);
         if (hint) *hint = near.tetrahedron;
@@ -134,7 +136,7 @@ dimmer_result dimmer_sample_model(const dimmer_pack* pack, const uint32_t* probe
                 return report({ErrorCode::InvalidArgument, fmt::format("a slot of {} probes along an axis", n)});
             count *= n;
         }
-        if (!holds(word_count, slot->first_probe + count)) return DIMMER_INVALID_ARGUMENT;
+        if (!holds(probes, word_count, slot->first_probe + count)) return DIMMER_INVALID_ARGUMENT;
         const GridSampler sampler(pack->pack, {probes, word_count});
         std::ranges::copy(sampler.sample(std::bit_cast<ModelSlot>(*slot), vec3(point_m), vec3(normal)), lux);
         return DIMMER_OK;

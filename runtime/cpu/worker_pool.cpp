@@ -1,9 +1,14 @@
 #include <cpu/worker_pool.h>
 
+#include <system_error>
+
 namespace dimmer {
 
 WorkerPool::WorkerPool(uint32_t threads) {
-    for (uint32_t i = 1; i < threads; ++i) workers_.emplace_back([this, i] { loop(i); });
+    try {
+        for (uint32_t i = 1; i < threads; ++i) workers_.emplace_back([this, i] { loop(i); });
+    } catch (const std::system_error&) {  // no more threads to be had
+    }
 }
 
 WorkerPool::~WorkerPool() {

@@ -12,7 +12,7 @@ namespace dimmer {
 
 class WorkerPool {
    public:
-    // The caller works too, so one thread fewer is started.
+    // The caller works too, so one thread fewer is started; fewer still where the system refuses, threads() says.
     explicit WorkerPool(uint32_t threads);
     ~WorkerPool();
     WorkerPool(const WorkerPool&) = delete;

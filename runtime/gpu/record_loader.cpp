@@ -26,15 +26,19 @@ void RecordLoader::add(uint32_t contribution, const RecordStore& store) {
     if (store.byteCount(contribution) == 0) return;
     total_ += store.byteCount(contribution);
     waiting_.push_back({contribution, 0});
+    if (is_waiting_.size() <= contribution) is_waiting_.resize(contribution + 1);
+    is_waiting_[contribution] = true;
 }
 
 void RecordLoader::cancel(uint32_t contribution) {
+    if (contribution >= is_waiting_.size() || !is_waiting_[contribution]) return;
+    is_waiting_[contribution] = false;
     std::erase_if(waiting_, [&](const Load& load) { return load.contribution == contribution; });
 }
 
 bool RecordLoader::pending(uint32_t contribution) const {
     return (in_flight_ && piece_of_ == contribution) ||
-           std::ranges::any_of(waiting_, [&](const Load& load) { return load.contribution == contribution; });
+           (contribution < is_waiting_.size() && is_waiting_[contribution]);
 }
 
 Expected<void> RecordLoader::create() {
@@ -87,7 +91,9 @@ Expected<void> RecordLoader::step(const RecordStore& store, uint64_t bytes_max) 
     load.next_byte += bytes;
     piece_of_ = load.contribution;
     piece_ = bytes;
-    if (bytes == left) waiting_.pop_front();
+    if (bytes < left) return {};
+    is_waiting_[load.contribution] = false;
+    waiting_.pop_front();
     return {};
 }
 

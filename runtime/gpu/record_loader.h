@@ -21,7 +21,7 @@ class RecordLoader {
     void cancel(uint32_t contribution);
     // Sends the next piece, of at most so many bytes, unless the last one is still under way. Returns at once.
     Expected<void> step(const RecordStore& store, uint64_t bytes_max);
-    bool pending(uint32_t contribution) const;
+    bool pending(uint32_t contribution) const;  // constant time
     bool busy() const { return !waiting_.empty() || in_flight_; }
     LoadProgress progress() const { return {done_, total_}; }
     uint64_t deviceBytes() const { return staging_.size_bytes; }
@@ -43,6 +43,7 @@ class RecordLoader {
     CommandBuffer commands_;
     FenceHandle fence_;
     std::deque<Load> waiting_;
+    std::vector<bool> is_waiting_;  // by contribution
     bool in_flight_ = false;
     uint32_t piece_of_ = 0;  // the contribution that is under way
     uint64_t piece_ = 0;     // and its bytes

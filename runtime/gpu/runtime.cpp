@@ -30,6 +30,13 @@ Expected<void> checkContext(const VulkanContext& vulkan) {
                 "and queue are all needed.");
 }
 
+// Of an update that found nothing to do.
+UpdateStats idleStats(double host_us) {
+    UpdateStats stats;
+    stats.host_us = host_us;
+    return stats;
+}
+
 Expected<SemaphoreHandle> createTimeline(VkDevice device) {
     auto type = vkStruct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
@@ -51,17 +58,21 @@ void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
     VulkanContext vulkan;
-    std::vector<LightmapPages> pages;           // one set, or two that take turns
-    uint32_t page_sets = 1;                     // as asked for
-    uint32_t front = 0;                         // the set to sample
-    uint32_t target = 0;                        // the set that the last plan writes
-    std::unique_ptr<TexelExecutor> executor;    // none when the pack has no receivers
-    std::optional<ProbeBlender> probes;         // none when the pack has no probes that change
-    std::optional<ProbeAtlas> atlas;            // none when there are no probes
-    std::optional<GpuBuffer> grid_table;        // none when the pack has no global grid
-    std::optional<ProbeResampler> resampler;    // none without room for moving models
-    std::span<const ResampleItem> model_items;  // of the last plan
+    std::vector<LightmapPages> pages;  // one set, or two that take turns
+    uint32_t page_sets = 1;            // as asked for
+    // The sets of pages and of probes to sample, and those that the last plan writes. Probes are not limited, so they
+    // change places with every update, pages when a state is complete.
+    uint32_t front = 0, target = 0;
+    uint32_t probe_front = 0, probe_target = 0;
+    uint32_t front_before = 0, probe_front_before = 0;  // what discardRecorded() goes back to
+    std::unique_ptr<TexelExecutor> executor;            // none when the pack has no receivers
+    std::optional<ProbeBlender> probes;                 // none when the pack has no probes that change
+    std::optional<ProbeAtlas> atlas;                    // none when there are no probes
+    std::optional<GpuBuffer> grid_table;                // none when the pack has no global grid
+    std::optional<ProbeResampler> resampler;            // none without room for moving models
+    std::span<const ResampleItem> model_items;          // of the last plan
     bool texels_planned = false, probes_planned = false, models_planned = false;
+    bool recorded = false;               // the last plan is in a command buffer of the caller's
     std::optional<RecordLoader> loader;  // none in modes that load nothing later
     std::vector<LightSet> loading;       // sets whose records are on their way
     std::vector<RecordsState> records;   // per element
@@ -167,8 +178,8 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
 void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner,
                                  bool drawing) {
     if (texels_planned) executor->write(planner, target);
-    if (probes_planned) probes->write(*probe_planner, target);
-    if (models_planned) resampler->write(model_items, target);
+    if (probes_planned) probes->write(*probe_planner, probe_target);
+    if (models_planned) resampler->write(model_items, probe_target);
     if (timer) timer->reset(commands);
     if (texels_planned) pages[target].beginWrites(commands, drawing);
     if (timer) timer->begin(commands);
@@ -184,10 +195,10 @@ uint32_t Runtime::Impl::dispatchProbes(VkCommandBuffer commands, const Planner* 
                                        VkPipelineStageFlags readers) {
     uint32_t dispatches = 0;
     ProbeAtlas::beginWrites(commands, readers);
-    if (probes_planned) dispatches += probes->dispatch(commands, *probe_planner, target);
+    if (probes_planned) dispatches += probes->dispatch(commands, *probe_planner, probe_target);
     if (models_planned) {
         ProbeAtlas::betweenWrites(commands);
-        resampler->dispatch(commands, target);
+        resampler->dispatch(commands, probe_target);
         ++dispatches;
     }
     ProbeAtlas::endWrites(commands, readers);
@@ -199,7 +210,7 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, planner, probe_planner, vulkan.compute_queue == VK_NULL_HANDLE);
+    recordUpdate(own.commands, planner, probe_planner, ownQueue() == vulkan.queue);
     DIMMER_VK(vkEndCommandBuffer, own.commands);
 
     const VkSemaphore semaphore = timeline.get();
@@ -244,74 +255,107 @@ Runtime::~Runtime() = default;
 Runtime::Runtime(Runtime&&) noexcept = default;
 Runtime& Runtime::operator=(Runtime&&) noexcept = default;
 
-// Plans the next update of the pages that are to be written. False: there is nothing to execute.
-bool Runtime::planNext() {
+// Plans the next update of the pages that are to be written.
+void Runtime::planTexels(UpdateStats& stats) {
     Impl& impl = *impl_;
-    impl.timed = false;
-    impl.stats = {};
-    impl.texels_planned = impl.probes_planned = impl.models_planned = false;
     const bool in_place = impl.pages.size() == 1;
     impl.target = in_place ? 0 : impl.front ^ 1;
     Planner& next = planner(impl.target);
-    if (!in_place && next.waiting()) {
+    if (!in_place && next.mayGoOn()) {
         impl.texels_planned = next.planWaiting();  // of one state to its end: pages are shown when they are complete
     } else {
-        const bool current = planner(impl.front).upToDate() && (!hasProbes() || probePlanner(impl.front).upToDate()) &&
-                             !models().dirty(impl.front);
-        if (!in_place && current) return false;
+        if (!in_place && !next.waiting() && planner(impl.front).upToDate()) return;
         impl.texels_planned = next.plan();
-        impl.probes_planned = hasProbes() && probePlanner(impl.target).plan();
-        if (impl.probes_planned) models().touch(impl.target, probePlanner(impl.target).work().items);
-        impl.models_planned = models().dirty(impl.target);
-        if (impl.models_planned) impl.model_items = models().take(impl.target);
+        // The other pages may hold the state already, when it is one of before.
+        if (!impl.texels_planned) impl.front = impl.target;
     }
-    impl.stats = next.stats();
-    if (impl.probes_planned) addProbes(probePlanner(impl.target).stats(), impl.stats);
-    if (impl.models_planned) countResampled(impl.model_items, impl.stats);
-    const bool any = impl.texels_planned || impl.probes_planned || impl.models_planned;
-    // The other pages may hold the state already, when it is one of before.
-    if (!any) impl.front = impl.target;
-    return any;
+    stats = next.stats();
+}
+
+// The same of light probes and those of models.
+void Runtime::planProbes(UpdateStats& stats) {
+    Impl& impl = *impl_;
+    const bool in_place = impl.pages.size() == 1;
+    const auto upToDate = [&](uint32_t set) {
+        return (!hasProbes() || probePlanner(set).upToDate()) && !models().dirty(set);
+    };
+    if (!in_place && upToDate(impl.probe_front)) return;
+    impl.probe_target = in_place ? 0 : impl.probe_front ^ 1;
+    impl.probes_planned = hasProbes() && probePlanner(impl.probe_target).plan();
+    if (impl.probes_planned) {
+        models().touch(impl.probe_target, probePlanner(impl.probe_target).work().items);
+        addProbes(probePlanner(impl.probe_target).stats(), stats);
+    }
+    impl.models_planned = models().dirty(impl.probe_target);
+    if (impl.models_planned) {
+        impl.model_items = models().take(impl.probe_target);
+        countResampled(impl.model_items, stats);
+    }
+    if (!impl.probes_planned && !impl.models_planned) impl.probe_front = impl.probe_target;
+}
+
+// What the next update will do. Nothing: there is nothing to execute, and the last update's figures stand.
+std::optional<UpdateStats> Runtime::planNext() {
+    Impl& impl = *impl_;
+    impl.texels_planned = impl.probes_planned = impl.models_planned = impl.recorded = false;
+    UpdateStats stats;
+    planTexels(stats);
+    planProbes(stats);
+    if (!impl.texels_planned && !impl.probes_planned && !impl.models_planned) return std::nullopt;
+    impl.timed = false;
+    return stats;
 }
 
 // What was planned cannot be carried out.
 void Runtime::rollback() {
     if (impl_->texels_planned) planner(impl_->target).rollback();
-    if (impl_->probes_planned) probePlanner(impl_->target).rollback();
-    if (impl_->models_planned) models().rollback(impl_->target);
+    if (impl_->probes_planned) probePlanner(impl_->probe_target).rollback();
+    if (impl_->models_planned) models().rollback(impl_->probe_target);
     impl_->timed = false;
 }
 
 const Planner* Runtime::plannedProbes() const {
-    return impl_->probes_planned ? &probePlanner(impl_->target) : nullptr;
+    return impl_->probes_planned ? &probePlanner(impl_->probe_target) : nullptr;
 }
 
 // What was planned has been sent or recorded.
-void Runtime::finish(double host_us) {
-    impl_->stats.host_us = host_us;
-    if (!planner(impl_->target).waiting()) impl_->front = impl_->target;
+void Runtime::finish() {
+    if (impl_->texels_planned && !planner(impl_->target).waiting()) impl_->front = impl_->target;
+    if (impl_->probes_planned || impl_->models_planned) impl_->probe_front = impl_->probe_target;
 }
 
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
     const auto start = std::chrono::steady_clock::now();
-    if (planNext()) {
-        // An update that submit() sent may still be reading the work list.
-        if (auto done = impl_->waitForSubmitted(); !done) {
-            rollback();
-            return std::unexpected(std::move(done.error()));
-        }
-        impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
-        finish(0);
+    const auto planned = planNext();
+    if (!planned) return idleStats(microsecondsSince(start));
+    impl_->stats = *planned;
+    // An update that submit() sent may still be reading the work list.
+    if (auto done = impl_->waitForSubmitted(); !done) {
+        rollback();
+        return std::unexpected(std::move(done.error()));
     }
+    impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
+    impl_->recorded = true;
+    impl_->front_before = impl_->front;
+    impl_->probe_front_before = impl_->probe_front;
+    finish();
     impl_->stats.host_us = microsecondsSince(start);
     return impl_->stats;
 }
 
+void Runtime::discardRecorded() {
+    if (!std::exchange(impl_->recorded, false)) return;
+    rollback();
+    impl_->front = impl_->front_before;
+    impl_->probe_front = impl_->probe_front_before;
+}
+
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     auto start = std::chrono::steady_clock::now();
-    const bool any = planNext();
-    const double planning_us = impl_->stats.host_us = microsecondsSince(start);
-    if (!any) return impl_->stats;
+    const auto planned = planNext();
+    const double planning_us = microsecondsSince(start);
+    if (!planned) return idleStats(planning_us);
+    impl_->stats = *planned;
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
@@ -320,7 +364,8 @@ Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
         rollback();
         return std::unexpected(std::move(sent.error()));
     }
-    finish(planning_us + microsecondsSince(start));
+    finish();
+    impl_->stats.host_us = planning_us + microsecondsSince(start);
     return impl_->stats;
 }
 
@@ -354,6 +399,8 @@ Expected<void> Runtime::checkLoadable(LightSet set) const {
 Expected<void> Runtime::dropRecords(LightSet set) {
     DIMMER_TRY(checkLoadable(set));
     hold(set, true);
+    // A state that is half written must go on without these records.
+    for (uint32_t i = 0; i < impl_->pages.size(); ++i) planner(i).startOver();
     impl_->records[set.element] = RecordsState::Dropped;
     std::erase_if(impl_->loading, [&](LightSet other) { return other.element == set.element; });
     forEachContribution(pack().data(), set, [&](uint32_t k) {
@@ -413,9 +460,13 @@ uint32_t Runtime::pageSet() const {
     return impl_->front;
 }
 
-VkBuffer Runtime::probes(uint32_t page_set) const {
+uint32_t Runtime::probeSet() const {
+    return impl_->probe_front;
+}
+
+VkBuffer Runtime::probes(uint32_t probe_set) const {
     if (!impl_->atlas) return VK_NULL_HANDLE;
-    return impl_->atlas->buffer(std::min(page_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+    return impl_->atlas->buffer(std::min(probe_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
 }
 
 VkBuffer Runtime::gridTable() const {
@@ -449,7 +500,7 @@ Expected<Runtime::Pages> Runtime::readPages() {
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     auto pages = impl_->pages[impl_->front].read(*transfer);
     if (!pages || !impl_->atlas) return pages;
-    auto probes = impl_->atlas->read(impl_->front, *transfer);
+    auto probes = impl_->atlas->read(impl_->probe_front, *transfer);
     if (!probes) return std::unexpected(std::move(probes.error()));
     pages->probes = std::move(*probes);
     return pages;

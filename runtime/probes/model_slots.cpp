@@ -186,7 +186,7 @@ void countResampled(std::span<const ResampleItem> items, UpdateStats& stats) {
 
 ModelSlots::ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_sets)
     : first_probe_(static_cast<uint32_t>(data.probes.base.size())),
-      probes_max_((probes_max + probes_granule - 1) / probes_granule * probes_granule),
+      probes_max_((std::min(probes_max, moving_probes_limit) + probes_granule - 1) / probes_granule * probes_granule),
       page_sets_(page_sets),
       has_grid_(!data.probes.global.empty()),
       grid_box_{data.probes.global.start.min_m, data.probes.global.start.max_m},

@@ -62,7 +62,7 @@ class ModelSlots {
         ModelGrid grid;
         Transform transform;
         Box box;
-        uint32_t first_probe = 0, generation = 0;
+        uint32_t first_probe = 0, generation = 1;
         uint32_t dirty = 0;  // a bit per set of pages
         uint32_t taken = 0;  // likewise, by the last take()
         bool used = false;

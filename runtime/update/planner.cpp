@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <utility>
 
 namespace dimmer {
 namespace {
@@ -49,8 +50,10 @@ void Planner::setElement(uint32_t index, Weight weight) {
 }
 
 void Planner::setLimits(const UpdateLimits& limits) {
+    if (limits == limits_) return;
+    recheck_ = recheck_ || limits.tolerance_quanta < limits_.tolerance_quanta;
+    starts_over_ = true;
     limits_ = limits;
-    recheck_ = true;
     if (!quanta_per_weight_.empty() || (limits.receivers_max == 0 && limits.tolerance_quanta == 0)) return;
     quanta_per_weight_ = quantaPerWeight(data_);
     for (const ClusterTerm& term : receivers_.terms) written_.push_back(planned_[term.contribution]);
@@ -94,12 +97,26 @@ void Planner::collectChanges() {
         planned_[k] = weight;
     }
     dirty_contributions_.clear();
-    // Once every weight is known: what is put off depends on all of them.
-    for (const Change& change : changes_)
-        for (const Holder& holder : tables_->holders_of_contribution[change.contribution])
-            touch(holder, change.before, planned_[change.contribution]);
+    for (const Change& change : changes_) touch(change);
+    touchMarked();
     if (recheck_) touchAllPutOff();
-    recheck_ = false;
+    recheck_ = starts_over_ = false;
+}
+
+void Planner::mark(uint32_t cluster) {
+    const size_t word = cluster / 64;
+    cluster_marks_[word] |= uint64_t{1} << (cluster % 64);
+    first_mark_ = first_mark_ == end_mark_ ? word : std::min(first_mark_, word);
+    end_mark_ = std::max(end_mark_, word + 1);
+}
+
+// In ascending order, and takes the marks away.
+template <class Visit>
+void Planner::visitMarked(Visit&& visit) {
+    for (size_t word = first_mark_; word < end_mark_; ++word)
+        for (uint64_t bits = std::exchange(cluster_marks_[word], 0); bits != 0; bits &= bits - 1)
+            visit(static_cast<uint32_t>(word * 64) + static_cast<uint32_t>(std::countr_zero(bits)));
+    first_mark_ = end_mark_ = 0;
 }
 
 void Planner::waitWhole(uint32_t cluster) {
@@ -108,15 +125,25 @@ void Planner::waitWhole(uint32_t cluster) {
     waiting.count = receivers_.clusters[cluster].batch_count;
 }
 
-void Planner::touch(const Holder& holder, const Weight& before, const Weight& now) {
-    Waiting& waiting = waiting_[holder.cluster];
-    if (limits_.tolerance_quanta > 0 && waiting.count == 0 &&
-        quantaPutOff(receivers_.clusters[holder.cluster]) <= limits_.tolerance_quanta) {
-        ++stats_.clusters_put_off;
-        return;
+void Planner::touch(const Change& change) {
+    const float moved = distance(change.before, planned_[change.contribution]);
+    for (const Holder& holder : tables_->holders_of_contribution[change.contribution]) {
+        Waiting& waiting = waiting_[holder.cluster];
+        if (!quanta_per_weight_.empty()) waiting.quanta += moved * quanta_per_weight_[holder.term];
+        if (limits_.tolerance_quanta > 0 && waiting.count == 0)
+            mark(holder.cluster);
+        else
+            waitWhole(holder.cluster);
     }
-    waitWhole(holder.cluster);
-    if (!quanta_per_weight_.empty()) waiting.quanta += distance(before, now) * quanta_per_weight_[holder.term];
+}
+
+// Once every weight is known, and once per cluster: what is put off depends on all of its contributions.
+void Planner::touchMarked() {
+    visitMarked([&](uint32_t cluster) {
+        if (quantaPutOff(receivers_.clusters[cluster]) > limits_.tolerance_quanta) return waitWhole(cluster);
+        ++stats_.clusters_put_off;
+        waiting_[cluster] = {};
+    });
 }
 
 // How far the light of a cluster that does not wait is from what the weights say, at most: measured from what was
@@ -141,6 +168,8 @@ void Planner::take(uint32_t cluster_index, uint32_t receivers) {
     const uint32_t batches = std::min(waiting.count, std::max(1u, receivers / batch_receivers_max));
     parts_.push_back({cluster_index, waiting.first, batches});
     waiting.first = (waiting.first + batches) % cluster.batch_count;
+    waiting.plans = 0;
+    waiting.quanta *= 1 - static_cast<float>(batches) / static_cast<float>(waiting.count);
     waiting.count -= batches;
     if (waiting.count > 0) return;
     waiting = {};
@@ -151,25 +180,18 @@ void Planner::take(uint32_t cluster_index, uint32_t receivers) {
 
 // In ascending order: neighbours on the pages are neighbours in memory. Through a bit per cluster, without sorting.
 void Planner::takeAll() {
-    size_t first_word = cluster_marks_.size(), end_word = 0;
-    for (uint32_t i : waiting_clusters_) {
-        cluster_marks_[i / 64] |= uint64_t{1} << (i % 64);
-        first_word = std::min<size_t>(first_word, i / 64);
-        end_word = std::max<size_t>(end_word, i / 64 + 1);
-    }
-    for (size_t word = first_word; word < end_word; ++word) {
-        for (uint64_t bits = cluster_marks_[word]; bits != 0; bits &= bits - 1)
-            take(static_cast<uint32_t>(word * 64) + static_cast<uint32_t>(std::countr_zero(bits)), UINT32_MAX);
-        cluster_marks_[word] = 0;
-    }
+    for (const uint32_t cluster : waiting_clusters_) mark(cluster);
+    visitMarked([&](uint32_t cluster) { take(cluster, UINT32_MAX); });
     waiting_clusters_.clear();
 }
 
-// The most visible first; what has waited counts for more with every plan, so nothing waits for ever.
+// The most visible first; what has waited counts for more with every plan. By the square: something faint waits behind
+// what changes in every frame for as many plans as the root of how much more that shows.
 void Planner::takeWithin(uint32_t receivers) {
     const auto urgency = [&](uint32_t cluster) {
         const Waiting& waiting = waiting_[cluster];
-        return (waiting.quanta + 1) * static_cast<float>(waiting.plans + 1);
+        const auto waited = static_cast<float>(waiting.plans + 1);
+        return (waiting.quanta + 1) * waited * waited;
     };
     std::ranges::sort(waiting_clusters_, [&](uint32_t a, uint32_t b) {
         const float first = urgency(a), second = urgency(b);

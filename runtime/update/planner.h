@@ -54,13 +54,16 @@ class Planner {
     void setElement(uint32_t index, Weight weight);
     // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records.
     void setLimits(const UpdateLimits& limits);
+    // What waits must not be written with the weights that the last plan() saw.
+    void startOver() { starts_over_ = true; }
 
     // Plans what changed since the last plan(), and what waits, and counts it as written. Cost: constant when there is
     // nothing to do, else in proportion to the clusters that hold a changed contribution. False: nothing to do, work()
     // is empty.
     bool plan();
-    // The same for what waits alone; changes are left to the next plan().
+    // The same for what waits alone; changes are left to the next plan(). Not after startOver() or other limits.
     bool planWaiting();
+    bool mayGoOn() const { return waiting() && !starts_over_; }
     // The last plan was not executed: what it would have written is written by the next one.
     void rollback();
 
@@ -90,7 +93,7 @@ class Planner {
     // Batches of a cluster that wait: `count` of them from `first` on, going round.
     struct Waiting {
         uint32_t first = 0, count = 0;
-        uint32_t plans = 0;  // that passed it by
+        uint32_t plans = 0;  // since anything of it was written
         float quanta = 0;    // by which the light there has changed, at most
     };
     // A part of a cluster to write now, and its terms that are on.
@@ -102,7 +105,11 @@ class Planner {
     Weight product(const Contribution& contribution) const;
     void markDirty(uint32_t contribution);
     void collectChanges();
-    void touch(const Holder& holder, const Weight& before, const Weight& now);
+    void touch(const Change& change);
+    void touchMarked();
+    void mark(uint32_t cluster);
+    template <class Visit>
+    void visitMarked(Visit&& visit);
     void waitWhole(uint32_t cluster);
     float quantaPutOff(const Cluster& cluster) const;
     void touchAllPutOff();
@@ -119,7 +126,8 @@ class Planner {
     UpdateLimits limits_;
     std::vector<float> quanta_per_weight_;  // per term; empty until there are limits
     std::vector<Weight> written_;           // per term, as clusters that do not wait hold it; likewise
-    bool recheck_ = false;                  // the limits changed: look at every cluster
+    bool recheck_ = false;                  // a lower tolerance: look at every cluster
+    bool starts_over_ = false;
 
     std::vector<Weight> elements_;  // as the game set them
     std::vector<Weight> planned_;   // per contribution
@@ -130,7 +138,8 @@ class Planner {
     bool carried_over_ = false;               // some clusters waited already when the last plan began
     std::vector<Waiting> waiting_;            // per cluster
     std::vector<uint32_t> waiting_clusters_;  // those with a count
-    std::vector<uint64_t> cluster_marks_;     // one bit per cluster
+    std::vector<uint64_t> cluster_marks_;     // one bit per cluster, all 0 between calls
+    size_t first_mark_ = 0, end_mark_ = 0;    // the words with marks
     std::vector<Part> parts_;                 // of the last plan, ascending by cluster
     std::vector<WorkItem> items_;
     std::vector<WorkTerm> terms_;

@@ -52,7 +52,7 @@ dimmer::Expected<void> addCrate(dimmer::Runtime& lights, const std::array<float,
     if (auto ok = lights.moveModel(*crate, moved); !ok) return ok;  // any frame, before its update
     const auto slot = lights.modelSlot(*crate);                     // for the shader; changes with the transform
     if (!slot) return std::unexpected(slot.error());
-    draw(*slot, lights.probes(lights.pageSet()), lights.gridTable());
+    draw(*slot, lights.probes(lights.probeSet()), lights.gridTable());
     // end snippet
     return {};
 }

@@ -101,7 +101,9 @@ int misuse(const char* path) {
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_set_weight(NULL, 0, 1));
 
     EXPECT_OK(dimmer_pack_open(path, &pack));
-    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "one thread", dimmer_lights_create_cpu(pack, 0, 0, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "1 to 1024 threads", dimmer_lights_create_cpu(pack, 0, 0, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "1 to 1024 threads",
+                   dimmer_lights_create_cpu(pack, UINT32_MAX, 0, &lights));
     EXPECT(lights == NULL);
     EXPECT_OK(dimmer_lights_create_cpu(pack, 2, 0, &lights));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "\"set0\"", dimmer_lights_set_weight(lights, 0, 2.5f));
@@ -117,6 +119,7 @@ int misuse(const char* path) {
     EXPECT(rgb[0] == 1 && rgb[1] == 1 && rgb[2] == 1);
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2048 texels", dimmer_lights_read_pages(lights, texel, texel, 1));
     EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_submit(lights, &stats));
+    EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_discard_recorded(lights));
     EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_wait(lights, NULL));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2048", dimmer_sample_lightmap(pack, texel, texel, 1, 0, uv, normal, rgb));
     EXPECT_FAILURE(DIMMER_NOT_FOUND, "no page 2", dimmer_sample_lightmap(pack, texel, texel, 2048, 2, uv, normal, rgb));
@@ -167,6 +170,7 @@ int light_a_model(const char* path, float before_lux[3], float after_lux[3], flo
     for (i = 3; i < 27; ++i) EXPECT(radiance[i] == 0);
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "words", dimmer_sample_air(pack, probes, 7, later, up, NULL, air_lux));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_sample_air(pack, probes, words, later, NULL, NULL, air_lux));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_sample_air(pack, NULL, words, later, up, NULL, air_lux));
 
     EXPECT_OK(dimmer_lights_remove_model(lights, model));
     EXPECT(dimmer_lights_move_model(lights, model, here) != DIMMER_OK);
@@ -271,8 +275,9 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
                    dimmer_lights_get_pages(lights, &own_irradiance, &own_direction, &own_count));
 
     EXPECT_OK(dimmer_lights_apply(lights, "all=0"));
-    EXPECT_OK(dimmer_lights_submit(lights, NULL));
+    EXPECT_OK(dimmer_lights_submit_after(lights, semaphore, value, NULL));
     EXPECT_OK(dimmer_lights_wait(lights, NULL));
+    EXPECT_OK(dimmer_lights_discard_recorded(lights)); /* nothing was */
     if ((failed = set_state(pack, lights)) != 0) return failed;
     if ((failed = update_by_recording(vulkan, lights)) != 0) return failed;
     EXPECT_OK(dimmer_lights_read_pages(lights, irradiance, direction, texel_count));

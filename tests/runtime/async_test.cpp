@@ -3,6 +3,8 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 
+#include <gpu/transfer.h>
+
 #include "gpu_fixture.h"
 #include "pages.h"
 
@@ -125,6 +127,108 @@ TEST_F(AsyncTest, ABudgetWithTwoSetsOfPagesShowsWholeStates) {
         }
     }
     EXPECT_GT(states, 5u);
+}
+
+// Light probes are not limited: each update brings them, while the pages' state is still coming in.
+TEST_F(AsyncTest, ABudgetOfTexelsLeavesProbesUpToDate) {
+    test::Random random(66);
+    PackData data = test::randomPack(66);
+    test::addRandomProbes(data, random);
+    const Pack pack = packOf(std::move(data));
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
+        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+        CpuRuntime cpu(pack);
+        ASSERT_TRUE(gpu.setLimits({.receivers_max = 200}));
+        for (int frame = 0; frame < 12; ++frame) {
+            const std::string state = test::randomState(pack.data(), random);
+            ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+            ASSERT_TRUE(gpu.submit());
+            cpu.update();
+            const auto pages = gpu.readPages();
+            ASSERT_TRUE(pages);
+            ASSERT_TRUE(std::ranges::equal(pages->probes, cpu.probes())) << "frame " << frame;
+        }
+    }
+}
+
+// The records of a set are gone, or the limits are, while a state of it is half written on the pages that are not
+// shown.
+TEST_F(AsyncTest, AHalfWrittenStateGoesOnWithoutWhatWasDropped) {
+    const Pack pack = packOf(test::randomPack(67, {.doors = 0}));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.setLimits({.receivers_max = 300}));
+    ASSERT_GT(gpu.submit()->receivers_waiting, 0u);
+    ASSERT_TRUE(gpu.dropRecords(LightSet{0}));
+    const uint32_t shown = gpu.pageSet();
+    while (gpu.pageSet() == shown) ASSERT_TRUE(gpu.submit());
+    CpuRuntime cpu(pack);
+    ASSERT_TRUE(cpu.apply("set0=0"));
+    cpu.update();
+    expectEqualPages(gpu, cpu);
+}
+
+TEST_F(AsyncTest, WithoutLimitsTheNextUpdateIsExact) {
+    const Pack pack = packOf(test::randomPack(68));
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
+        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+        ASSERT_TRUE(gpu.setLimits({.receivers_max = 300}));
+        ASSERT_GT(gpu.submit()->receivers_waiting, 0u);
+        ASSERT_TRUE(gpu.apply("all=0.25") && gpu.setLimits({}));
+        EXPECT_EQ(gpu.submit()->receivers_waiting, 0u);
+        CpuRuntime cpu(pack);
+        ASSERT_TRUE(cpu.apply("all=0.25"));
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+        // The same limits again are no change: nothing runs, and the pages stay where they are.
+        const uint32_t shown = gpu.pageSet();
+        for (int i = 0; i < 3; ++i) {
+            ASSERT_TRUE(gpu.setLimits({}) && gpu.submit());
+            EXPECT_EQ(gpu.pageSet(), shown);
+        }
+    }
+}
+
+TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpFor) {
+    test::Random random(69);
+    PackData data = test::randomPack(69);
+    test::addRandomProbes(data, random);
+    const Pack pack = packOf(std::move(data));
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
+        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+        CpuRuntime cpu(pack);
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        const uint32_t shown = gpu.pageSet();
+        for (int round = 0; round < 3; ++round) {
+            const std::string state = test::randomState(pack.data(), random);
+            ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+            auto commands = createCommandBuffer(device().context().device, device().context().queue_family);
+            ASSERT_TRUE(commands);
+            VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
+            ASSERT_EQ(vkBeginCommandBuffer(commands->commands, &begin), VK_SUCCESS);
+            ASSERT_GT(gpu.record(commands->commands)->dispatches, 0u);
+            ASSERT_EQ(vkEndCommandBuffer(commands->commands), VK_SUCCESS);
+            gpu.discardRecorded();
+            gpu.discardRecorded();  // once is enough
+        }
+        EXPECT_EQ(gpu.pageSet(), shown);
+        ASSERT_TRUE(gpu.submit());
+        gpu.discardRecorded();  // what was sent stays
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+        EXPECT_TRUE(std::ranges::equal(gpu.readPages()->probes, cpu.probes()));
+    }
+}
+
+TEST_F(AsyncTest, FiguresOfAnUpdateOutliveIdleOnes) {
+    Runtime gpu = runtimeOf(packOf(test::randomPack(70)));
+    const auto sent = gpu.submit();
+    ASSERT_TRUE(sent);
+    EXPECT_EQ(gpu.submit()->receivers, 0u);
+    const auto figures = gpu.wait();
+    ASSERT_TRUE(figures);
+    EXPECT_EQ(figures->receivers, sent->receivers);
+    EXPECT_GT(figures->gpu_us, 0);
 }
 
 TEST_F(AsyncTest, TheOwnQueueWaitsForAndSignalsSemaphores) {

@@ -88,6 +88,37 @@ TEST(UpdateLimits, UnderConstantChangeNothingStarves) {
     EXPECT_TRUE(samePages(runtime, freshLike(runtime)));
 }
 
+// Two clusters larger than the limit change by all they can in every frame, two of a batch each changed a little, once.
+TEST(UpdateLimits, WhatFlickersLeavesRoomForWhatChangedOnce) {
+    PackData data = test::emptyPack(4, 0);
+    data.page_width = data.page_height = 128;
+    test::Random random(56);
+    const test::ClusterPlan plans[] = {{{0}, 6400}, {{1}, 6400}, {{2}, 64}, {{3}, 64}};
+    test::fillPack(data, plans, random);
+    const Pack pack = packOf(std::move(data));
+    CpuRuntime runtime(pack);
+    ASSERT_TRUE(runtime.apply("all=0"));
+    runtime.update();
+    const std::vector<uint32_t> dark(runtime.irradiancePages().begin(), runtime.irradiancePages().end());
+    ASSERT_TRUE(runtime.setLimits({.receivers_max = 2048}));
+    ASSERT_TRUE(runtime.apply("set2=0.01,set3=0.01"));
+    const CpuRuntime wanted = freshLike(runtime);
+    const PackData& d = pack.data();
+    std::vector<bool> flickered(d.addresses.size());
+    for (uint32_t frame = 0; frame < 60; ++frame) {
+        ASSERT_TRUE(runtime.apply(frame % 2 ? "set0=0.5,set1=0.5" : "set0=1,set1=1"));
+        EXPECT_LE(runtime.update().receivers, 2048u);
+        for (uint32_t i = 0; i < 12800; ++i)
+            if (runtime.irradiancePages()[test::texelOf(d, i)] != dark[test::texelOf(d, i)]) flickered[i] = true;
+    }
+    for (uint32_t i = 12800; i < 12928; ++i)
+        EXPECT_EQ(runtime.irradiancePages()[test::texelOf(d, i)], wanted.irradiancePages()[test::texelOf(d, i)]) << i;
+    CpuRuntime full(pack);
+    full.update();
+    for (uint32_t i = 0; i < 12800; ++i)  // but for black records
+        EXPECT_TRUE(flickered[i] || full.irradiancePages()[test::texelOf(d, i)] == dark[test::texelOf(d, i)]) << i;
+}
+
 TEST(UpdateLimits, TheMostVisibleComesFirst) {
     // Two clusters of a batch each on the same base; set 1 adds a thousand times what set 0 does.
     PackData data = test::emptyPack(2, 0);

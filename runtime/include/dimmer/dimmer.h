@@ -158,7 +158,7 @@ dimmer_result dimmer_pack_get_model_mesh(const dimmer_pack* pack, uint32_t index
 
 typedef struct dimmer_lights dimmer_lights;
 
-/* On the CPU, with `thread_count` threads (1 or more, the caller's included) and room for `moving_probes_max` probes of
+/* On the CPU, with `thread_count` threads (1 to 1024, the caller's included) and room for `moving_probes_max` probes of
  * models that move (28 bytes each). Keeps what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
@@ -270,9 +270,15 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
  * compute shaders sample afterwards. Nothing changed: nothing is recorded. The submission must have completed before
  * the next recording. */
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
+/* What was recorded last will never run (a frame was given up): the next update does its work. */
+dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights);
 
 /* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. */
 dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats);
+/* The same, once `semaphore` (null: nothing) is signalled, with `value` if it is a timeline semaphore: with a queue of
+ * its own an update must wait for the frames that sample what it writes. */
+dimmer_result dimmer_lights_submit_after(dimmer_lights* lights, VkSemaphore semaphore, uint64_t value,
+                                         dimmer_update_stats* stats);
 /* Blocks until what was submitted is done, and gives the last update's figures, its time on the GPU included. */
 dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* stats);
 /* A timeline semaphore, and the value that the last submission signals. */

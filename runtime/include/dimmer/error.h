@@ -1,4 +1,5 @@
-// Errors are values: every call that can fail returns Expected<T>; nothing throws across the API.
+// Errors are values: every call that can fail returns Expected<T>; nothing throws across the API,
+// but for std::bad_alloc where the host has no memory left.
 #pragma once
 
 #include <expected>

@@ -46,6 +46,7 @@ struct UpdateLimits {
     // say than so many steps of the format, counted from what was last written. At 0.5 the stored value is one step off
     // at most. 0: everything is written.
     float tolerance_quanta = 0;
+    bool operator==(const UpdateLimits&) const = default;
 };
 
 // Not thread-safe: call from one thread at a time. Nothing here touches a GPU; a change costs nanoseconds and takes

@@ -25,12 +25,15 @@ struct ModelGrid {
 ModelGrid modelGrid(std::array<float, 3> min_m, std::array<float, 3> max_m, float spacing_m = 1.5f,
                     uint32_t probes_max = 64);
 
+// More than this a runtime keeps no room for, whatever it is asked: half a gigabyte of probes.
+inline constexpr uint32_t moving_probes_limit = 1 << 24;
+
 // A model that was added. Handles of removed models are refused, not mistaken for later ones.
 struct Model {
-    uint32_t index = 0, generation = 0;
+    uint32_t index = 0, generation = 0;  // generations begin at 1: what was never added is no model
 };
 
-// What a shader needs to light a model: dimmer_model_irradiance in grid.glsl, modelIrradiance on the CPU. Its probes
+// What a shader needs to light a model: dimmer_model_irradiance in grid.glsl, GridSampler on the CPU. Its probes
 // follow one another, x fastest, then y.
 struct ModelSlot {
     uint32_t first_probe = 0;

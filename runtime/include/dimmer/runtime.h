@@ -6,6 +6,7 @@
 #include <vulkan/vulkan.h>
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace dimmer {
@@ -48,8 +49,8 @@ struct RuntimeOptions {
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
     // always-on light that doors let through is loaded in any case.
     bool load_records = true;
-    // Room for the probes of moving models (LightState::addModel), in probes; 0: no models, and nothing is kept for
-    // them.
+    // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; 0: no models,
+    // and nothing is kept for them.
     uint32_t moving_probes_max = 0;
     // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
@@ -97,9 +98,11 @@ class Runtime : public LightState {
 
     // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
     // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. Nothing
-    // changed: records nothing. One recording for each set of pages may be in flight: before the next, the earlier
-    // submission must have completed on the GPU.
+    // changed: records nothing. The submission of one recording must have completed on the GPU before the next one;
+    // with two sets of pages and no limits, before the next but one.
     Expected<UpdateStats> record(VkCommandBuffer commands);
+    // The commands of the last record() will never run (a frame was given up): the next update does their work.
+    void discardRecorded();
 
     // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
     // own. Returns at once; a later call waits for the earlier update. Nothing changed: no submission, and no wait.
@@ -108,8 +111,8 @@ class Runtime : public LightState {
     // The timeline semaphore of submit() and the value that its last submission signals.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
-    // Blocks until what submit() sent is done. Statistics of the last update, GPU time included; after record(), call
-    // it once the commands have completed.
+    // Blocks until what submit() sent is done. Statistics of the last update that did anything, GPU time included;
+    // after record(), call it once the commands have completed.
     Expected<UpdateStats> wait();
 
     // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
@@ -130,13 +133,15 @@ class Runtime : public LightState {
     LightmapImages images() const { return images(pageSet()); }
     LightmapImages images(uint32_t page_set) const;
     uint32_t pageSet() const;
-    // The light probes that go with a set of pages, by their number, 7 words each (see runtime/format/probe.h): a
-    // storage buffer, with those of models behind the pack's. Null where there are none. Shaders read it by grid.glsl.
-    VkBuffer probes(uint32_t page_set) const;
+    // The light probes, by their number, 7 words each (see runtime/format/probe.h): a storage buffer, with those of
+    // models behind the pack's. Null where there are none. Shaders read it by grid.glsl. Buffering::Double: of two
+    // sets, probeSet() is the one to read after the last update; limits are of pages alone, so the two part ways.
+    VkBuffer probes(uint32_t probe_set) const;
+    uint32_t probeSet() const;
     // The global light grid's tables for grid.glsl, a storage buffer; null where the pack has no such grid.
     VkBuffer gridTable() const;
     // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
-    // changes anything has its pages and nothing else.
+    // changes anything has its pages, and its light grid's probes and tables, and nothing else.
     DeviceFootprint footprint() const;
 
     // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime.
@@ -149,12 +154,14 @@ class Runtime : public LightState {
    private:
     struct Impl;
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl, uint32_t moving_probes_max);
-    bool planNext();
+    void planTexels(UpdateStats& stats);
+    void planProbes(UpdateStats& stats);
+    std::optional<UpdateStats> planNext();
     void rollback();
     const Planner* plannedProbes() const;
     Expected<void> checkLoadable(LightSet set) const;
     void finishLoading();
-    void finish(double host_us);
+    void finish();
     std::unique_ptr<Impl> impl_;
 };
 

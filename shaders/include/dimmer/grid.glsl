@@ -39,7 +39,7 @@ struct DimmerGridPlace {
 
 // The table: min.xyz and where positions begin; max.xyz and where tetrahedra do; counts.xyz of the start grid and where
 // the starts do; whether there is visibility, and how many tetrahedra. A position is one element, a tetrahedron three:
-// probes, neighbours, visibility; four starts share one. See gridTable in runtime/gpu/probe_resampler.cpp.
+// probes, neighbours, visibility; four starts share one. See runtime/probes/grid_table.cpp.
 uvec4 dimmer_tetrahedron_part(uint tetrahedron, uint part) {
     return DIMMER_GRID_WORDS(DIMMER_GRID_WORDS(1).w + 3u * tetrahedron + part);
 }
