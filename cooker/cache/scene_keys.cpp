@@ -109,6 +109,7 @@ Key sceneKey(const Scene& scene) {
     for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
         key.add(scene.light_sets[s].name).add(scene.light_sets[s].max_weight);
     for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) key.add(lampsKey(scene, g));
+    for (const PunctualLight& light : scene.lights) key.add(light.node);  // warnings name it
     key.add(uint64_t{scene.viewpoints.size()});
     for (const SceneViewpoint& v : scene.viewpoints) {
         key.add(v.name).add(v.vertical_fov_rad);

@@ -94,17 +94,21 @@ TexelRecord encodeTexel(const Gathered& light, const TexelEncoding& encoding) {
 float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
     constexpr float half_of_largest = 64512.0f / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
     float largest = 0;
-    for (size_t i = 0; i < baked.light.rows(); ++i) {
+    // A record is stored as it is at weight 1, whether the game may set that or not.
+    const auto consider = [&](const auto& row, auto&& valueOf) {
         glm::vec3 sum(0);
-        for (const ReceiverLight& l : baked.light.row(i)) sum += max_weights[l.term] * l.light.irradiance_lux;
-        largest = std::max({largest, sum.x, sum.y, sum.z});
-    }
-    for (const auto* probes : {&baked.grid.light, &baked.local_light})
-        for (size_t i = 0; i < probes->rows(); ++i) {
-            glm::vec3 sum(0);
-            for (const ProbeTermLight& l : probes->row(i)) sum += max_weights[l.term] * l.light.radiance[0];
-            largest = std::max({largest, sum.x, sum.y, sum.z});
+        for (const auto& l : row) {
+            const glm::vec3 value = valueOf(l.light);
+            sum += max_weights[l.term] * value;
+            largest = std::max({largest, value.x, value.y, value.z});
         }
+        largest = std::max({largest, sum.x, sum.y, sum.z});
+    };
+    for (size_t i = 0; i < baked.light.rows(); ++i)
+        consider(baked.light.row(i), [](const Gathered& light) { return light.irradiance_lux; });
+    for (const auto* probes : {&baked.grid.light, &baked.local_light})
+        for (size_t i = 0; i < probes->rows(); ++i)
+            consider(probes->row(i), [](const ProbeLight& light) { return light.radiance[0]; });
     if (!(largest > 0) || !std::isfinite(largest)) return 1;
     constexpr float most = exposure_log2_max;
     return std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -most, most));

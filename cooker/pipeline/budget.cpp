@@ -16,6 +16,10 @@ std::string megabytes(uint64_t bytes) {
     return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
 }
 
+std::string describe(const Element& element) {
+    return fmt::format("{} '{}'", element.kind == ElementKind::Door ? "door" : "light set", element.name);
+}
+
 std::string largestElements(const PackData& pack, const PackCost& cost) {
     std::vector<ElementCost> by_size = cost.elements;
     std::ranges::stable_sort(by_size, [](const auto& a, const auto& b) { return a.bytes > b.bytes; });
@@ -76,7 +80,7 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
     check("global grid", cost.global_grid, profile.budget_global_grid);
     check("local grids", cost.local_grids, profile.budget_local_grids);
     for (const ElementCost& e : cost.elements)
-        check(fmt::format("element '{}'", pack.elements[e.element].name), e.bytes, profile.budget_per_element);
+        check(describe(pack.elements[e.element]), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
     std::string holders;
     if (!cost.elements.empty()) holders = "; the largest elements: " + largestElements(pack, cost);

@@ -1,5 +1,7 @@
 #include <pipeline/cook.h>
 
+#include <pipeline/cook_warnings.h>
+
 #include <bake/bake.h>
 #include <bake/buried_lights.h>
 #include <bake/overlap.h>
@@ -307,6 +309,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack.color_format = profile.color_format;
         pack.direction_model = profile.direction_model;
         pack.exposure = chooseExposure(baked, max_weights);
+        if (auto warning = coarseExposure(scene, pack.exposure)) stats.warnings.push_back(std::move(*warning));
         buildClusters(texels, baked, contribution_of_term, pack);
         buildProbeClusters(baked, contribution_of_term, pack);
         pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));
@@ -378,7 +381,9 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
             return fail(ErrorCode::OverBudget, within.error().message + (ways.empty() ? "; no setting alone would help"
                                                                                       : "; what would help:" + ways));
         }
-        Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses);
+        const auto density_steps = std::ranges::count_if(
+            result.fitted, [](const Remedy& r) { return r.changes.front().key == "lightmaps.texels_per_metre"; });
+        Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
         if (remedy.changes.empty())
             return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help");
         for (const Change& c : remedy.changes)

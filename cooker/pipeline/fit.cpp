@@ -144,11 +144,13 @@ double overBy(const PackCost& cost, const Profile& profile) {
 }
 
 // Saves nothing where no budget that it helps with is exceeded.
-Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses) {
+Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses, size_t steps_before) {
     Remedy remedy;
     const double over = overBy(cost, profile);
     if (!(over > 1)) return remedy;
-    const double wanted = density_margin / over, factor = std::min(losses.factorFor(wanted), density_factor_max);
+    // Steps that fell short were too small for pages that do not shrink as their texels do: go further than it takes.
+    const double wanted = std::pow(density_margin / over, 1 + static_cast<double>(steps_before));
+    const double factor = std::min(losses.factorFor(wanted), density_factor_max);
     const float from = profile.texels_per_metre;
     const float to = std::max(0.01f, std::floor(from / static_cast<float>(factor) * 100) / 100);
     if (!(to < from)) return remedy;
@@ -246,9 +248,11 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
     const auto limits = limitsOf(pack, cost, profile, losses);
     std::vector<Remedy> found;
     const auto add = [&](Remedy remedy) {
-        if (remedy.saves > 0 && !remedy.changes.empty()) found.push_back(std::move(remedy));
+        const auto same = [&](const Remedy& other) { return other.changes == remedy.changes; };
+        if (remedy.saves == 0 || remedy.changes.empty() || std::ranges::any_of(found, same)) return;
+        found.push_back(std::move(remedy));
     };
-    add(byDensity(cost, profile, losses));
+    add(byDensity(cost, profile, losses, 0));
     add(byProbes(pack, cost, profile, losses));
     add(byLocalProbes(pack, cost, profile));
     if (!baseIsOver(cost, profile) && exceeded(limits, Rungs(losses.groupCount(), 0))) {
@@ -263,7 +267,8 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
     return found;
 }
 
-Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
+Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
+                     size_t density_steps) {
     const auto limits = limitsOf(pack, cost, profile, losses);
     if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile, losses);
     if (localGridsAreOver(cost, profile)) return byLocalProbes(pack, cost, profile);
@@ -271,7 +276,7 @@ Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& 
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
         if (thresholds.fits && !thresholds.changes.empty()) return thresholds;
     }
-    return byDensity(cost, profile, losses);
+    return byDensity(cost, profile, losses, density_steps);
 }
 
 }  // namespace dimmer::cook

@@ -13,6 +13,7 @@ namespace dimmer::cook {
 struct Change {
     std::string key;
     float from = 0, to = 0;
+    bool operator==(const Change&) const = default;
 };
 
 struct Remedy {
@@ -31,7 +32,9 @@ struct Remedy {
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 
-// What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do.
-Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses);
+// What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do;
+// further than predicted where so many steps of density fell short.
+Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
+                     size_t density_steps = 0);
 
 }  // namespace dimmer::cook

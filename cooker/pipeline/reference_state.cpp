@@ -23,6 +23,17 @@ Expected<size_t> indexOf(const std::vector<Named>& list, std::string_view name, 
                                                  near.empty() ? "." : fmt::format("; did you mean \"{}\"?", near)));
 }
 
+// As the runtime has it.
+Expected<glm::vec3> weightOf(const SceneLightSet& set, const StateAssignment& item) {
+    const glm::vec3 weight(item.value.r, item.value.g, item.value.b);
+    if (glm::all(glm::greaterThanEqual(weight, glm::vec3(0))) &&
+        glm::all(glm::lessThanEqual(weight, glm::vec3(set.max_weight))))
+        return weight;
+    return fail(ErrorCode::InvalidArgument,
+                fmt::format("Light set \"{}\": the weight {}/{}/{} is not within 0..{}, the level's dimmer_max_weight.",
+                            set.name, weight.r, weight.g, weight.b, set.max_weight));
+}
+
 Expected<void> setDoor(const Scene& scene, const StateAssignment& item, ReferenceState& state) {
     const auto door = indexOf(scene.doors, item.name, "door");
     if (!door) return std::unexpected(door.error());
@@ -47,18 +58,24 @@ Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view
     const auto assignments = parseState(text);
     if (!assignments) return std::unexpected(assignments.error());
     using Target = StateAssignment::Target;
-    ReferenceState state{std::vector<glm::vec3>(scene.light_sets.size(), glm::vec3(1)),
-                         std::vector<bool>(scene.doors.size())};
+    ReferenceState state{{}, std::vector<bool>(scene.doors.size())};
+    for (const auto& set : scene.light_sets) state.set_weights.emplace_back(std::min(1.0f, set.max_weight));
+    const auto assign = [&](size_t set, const StateAssignment& item) -> Expected<void> {
+        const auto weight = weightOf(scene.light_sets[set], item);
+        if (!weight) return std::unexpected(weight.error());
+        state.set_weights[set] = *weight;
+        return {};
+    };
     for (const StateAssignment& item : *assignments)
-        if (item.target == Target::AllSets)
-            std::ranges::fill(state.set_weights, glm::vec3(item.value.r, item.value.g, item.value.b));
+        for (size_t set = 0; item.target == Target::AllSets && set < scene.light_sets.size(); ++set)
+            if (auto ok = assign(set, item); !ok) return std::unexpected(ok.error());
     for (const StateAssignment& item : *assignments) {
         if (item.target == Target::Door)
             if (auto ok = setDoor(scene, item, state); !ok) return std::unexpected(ok.error());
         if (item.target != Target::Set) continue;
         const auto set = indexOf(scene.light_sets, item.name, "light set");
         if (!set) return std::unexpected(set.error());
-        state.set_weights[*set] = {item.value.r, item.value.g, item.value.b};
+        if (auto ok = assign(*set, item); !ok) return std::unexpected(ok.error());
     }
     return state;
 }

@@ -16,7 +16,8 @@ struct ReferenceState {
     ReferenceOptions options(uint32_t seed) const { return {.seed = seed, .set_weights = set_weights}; }
 };
 
-// Reads e.g. "hall=0.5,door:front=1". Doors are closed or open: what half open looks like is a matter of blending.
+// Reads e.g. "hall=0.5,door:front=1". What is not named is as in the runtime: sets at 1, or their maximum where that is
+// smaller, doors closed. Doors are closed or open: what half open looks like is a matter of blending.
 Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view state);
 
 // The level as it stands: open doors are gone, or in their open poses.

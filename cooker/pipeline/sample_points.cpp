@@ -48,10 +48,10 @@ Expected<std::vector<QueryPoint>> parsePoints(std::istream& in, const std::strin
         if (line.empty()) continue;
         std::array<float, 6> v{};
         if (!parseLine(line, v)) return bad(file, number, "six finite numbers x,y,z,nx,ny,nz were expected");
-        const glm::vec3 normal(v[3], v[4], v[5]);
-        const float length = glm::length(normal);
-        if (!(length > 1e-6f)) return bad(file, number, "the normal has no length");
-        points.push_back({{v[0], v[1], v[2]}, normal / length});
+        const glm::dvec3 normal(v[3], v[4], v[5]);  // whose squares fit, however long a normal somebody writes
+        const double length = glm::length(normal);
+        if (!(length > 1e-6)) return bad(file, number, "the normal has no length");
+        points.push_back({{v[0], v[1], v[2]}, glm::vec3(normal / length)});
     }
     if (in.bad()) return fail(ErrorCode::Io, fmt::format("{}: the points cannot be read", file));
     if (points.empty())

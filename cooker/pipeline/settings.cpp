@@ -72,6 +72,7 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
 
 // "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
 std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
+    if (key == "extends" || key == "description") return fmt::format("'{}' belongs in a profile's file", key);
     const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
     if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
     std::vector<std::string_view> known = {"extends", "description"};

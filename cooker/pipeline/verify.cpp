@@ -265,14 +265,17 @@ Expected<std::vector<double>> packLight(const Pack& pack, std::span<const Verify
 
 Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::span<const VerifyPoint> points,
                                   uint32_t set, uint32_t seed, Progress& progress, uint32_t paths_max) {
-    const std::string name = pack.elements()[set].name;
-    auto with = packLight(pack, points, false, fmt::format("all=0,{}=1", name));
+    const Element& element = pack.elements()[set];
+    const float weight = std::min(1.0f, element.max_weight);
+    auto with = packLight(pack, points, false, fmt::format("all=0,{}={}", element.name, weight));
     if (!with) return std::unexpected(with.error());
     auto without = packLight(pack, points, false, "all=0");
     if (!without) return std::unexpected(without.error());
     std::ranges::transform(*with, *without, with->begin(), std::minus{});
 
-    const ReferenceTracer tracer(rays, onlySet(set, rays.scene().light_sets.size(), seed));
+    ReferenceOptions alone = onlySet(set, rays.scene().light_sets.size(), seed);
+    alone.set_weights[set] *= weight;
+    const ReferenceTracer tracer(rays, alone);
     const auto where = queries(points, false);
     std::vector<ReferenceEstimate> estimates(points.size());
     refineAll(tracer, where, {.paths_min = set_paths_first, .paths_max = set_paths_first}, estimates, progress);

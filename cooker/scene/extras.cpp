@@ -143,12 +143,14 @@ void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, Extr
 
 Expected<void> checkElementName(const ImportContext& context, const std::string& name, std::string_view key,
                                 const std::string& owner) {
-    const bool writable = !name.empty() && name.find_first_of(",=") == std::string::npos &&
+    // A state is written with blanks between its parts, or without.
+    const bool blank_ends = name.starts_with(' ') || name.ends_with(' ');
+    const bool writable = !name.empty() && !blank_ends && name.find_first_of(",=") == std::string::npos &&
                           std::ranges::none_of(name, [](unsigned char c) { return c < 0x20; });
     if (!writable)
         return context.error(owner,
                              fmt::format("'{}' is '{}', but a name needs a character, and none of ',', '=' and line "
-                                         "breaks. Rename it.",
+                                         "breaks, nor blanks at its ends. Rename it.",
                                          key, name));
     if (key == "dimmer_light_set" && (name == "all" || name.starts_with("door:")))
         return context.error(owner, fmt::format("the light set's name '{}' has a meaning of its own where states are "

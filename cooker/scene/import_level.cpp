@@ -21,6 +21,8 @@ namespace dimmer::cook {
 namespace {
 
 constexpr std::string_view player_start = "player_start";
+constexpr double texel_density_max = 256;  // per metre, as in profiles
+const std::vector<std::string_view> bake_modes = {"indirect", "full", "none"};
 
 class LevelImporter {
    public:
@@ -86,6 +88,8 @@ class LevelImporter {
         if (*play_area)
             if (const auto ok = playArea(at); !ok) return ok;
 
+        if (node.mesh >= 0 || shines)
+            if (const auto ok = warnOfMisplaced(extras, owner, node.mesh >= 0, shines); !ok) return ok;
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
         if (shines)
@@ -197,6 +201,10 @@ class LevelImporter {
         if (!lighting) return std::unexpected(lighting.error());
         const auto density = extras.positive("dimmer_texel_density");
         if (!density) return std::unexpected(density.error());
+        if (density->value_or(0) > texel_density_max)
+            return context_.error(owner, fmt::format("its 'dimmer_texel_density' is {}; more than {} texels per metre "
+                                                     "are not made. Correct the custom property.",
+                                                     **density, texel_density_max));
         const auto spacing = extras.positive("dimmer_grid_spacing");
         if (!spacing) return std::unexpected(spacing.error());
         const auto narrow = [](std::optional<double> value) {
@@ -242,6 +250,18 @@ class LevelImporter {
     bool isEmissiveMesh(const SceneMesh& mesh) const {
         return std::ranges::any_of(mesh.triangle_materials,
                                    [&](uint32_t material) { return isEmissive(scene_.materials[material]); });
+    }
+
+    // What a key says of things that the node has not.
+    Expected<void> warnOfMisplaced(const Extras& extras, const std::string& owner, bool is_mesh, bool is_light) {
+        const auto bake = extras.choice("dimmer_bake", bake_modes);
+        if (!bake) return std::unexpected(bake.error());
+        if (*bake && !is_light)
+            context_.warn(owner, "'dimmer_bake' is for lights and was ignored; what shines is baked whole.");
+        for (const char* key : {"dimmer_texel_density", "dimmer_grid_spacing"})
+            if (extras.raw(key) != nullptr && !is_mesh)
+                context_.warn(owner, fmt::format("'{}' is for meshes and was ignored.", key));
+        return {};
     }
 
     Expected<void> mesh(const PlacedNode& at, const Extras& extras, const std::string& owner) {
@@ -305,7 +325,7 @@ class LevelImporter {
                                                 : importLight(context_, *punctual, at.node, at.world_from_node);
         if (!light) return std::unexpected(light.error());
         light->node = nodeName(at.node);
-        const auto bake = extras.choice("dimmer_bake", {"indirect", "full", "none"});
+        const auto bake = extras.choice("dimmer_bake", bake_modes);
         if (!bake) return std::unexpected(bake.error());
         constexpr BakeMode of_choice[] = {BakeMode::Indirect, BakeMode::Full, BakeMode::None};
         if (*bake) light->bake = of_choice[**bake];

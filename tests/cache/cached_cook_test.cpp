@@ -156,6 +156,15 @@ TEST_F(CachedCook, BudgetsAndNamesOfFilesMakeNoLight) {
                 ElementsAre("pack", "always-on light", "light set 'one'", "light set 'both'", "light set 'two'"));
 }
 
+// What a warning would name is known anew; no light is made for it.
+TEST_F(CachedCook, ARenamedLampMakesThePackAlone) {
+    LevelFile level = houseOfTwo();
+    made(level);
+    for (json& node : level.document["nodes"])
+        if (node["name"] == "lamp1") node["name"] = "lamp_one";
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+}
+
 // The same with a thing that moves, and so with a global grid.
 LevelFile houseWithGrid() {
     LevelFile level = houseOfTwo();

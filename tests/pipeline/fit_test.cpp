@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <format/texel.h>
 #include <gmock/gmock.h>
+#include <pipeline/cook_warnings.h>
 #include <pipeline/fit.h>
 #include <pipeline/small_level.h>
 
@@ -193,6 +194,36 @@ TEST_F(Fit, FewerProbesWhereTheGridIsTooLarge) {
     // Tetrahedra and the table of cells do not go quite with the number of probes.
     EXPECT_NEAR(static_cast<double>(fitted->fitted.at(0).saves), static_cast<double>(all - left),
                 0.15 * static_cast<double>(all));
+}
+
+// Twice the budget: 0.97 of half the texels are left, or, where a step before fell short, the square of that share.
+TEST(DensityBudget, GoesFurtherWhereAStepFellShort) {
+    PackCost cost;
+    cost.base_lightmap = 2000;
+    Profile profile;
+    profile.texels_per_metre = 8;
+    profile.budget_base_lightmaps = 1000;
+    for (const size_t steps : {0u, 1u, 2u}) {
+        const Remedy remedy = fittingRemedy({}, cost, profile, {}, steps);
+        ASSERT_EQ(remedy.changes.size(), 1u);
+        EXPECT_EQ(remedy.changes[0].key, "lightmaps.texels_per_metre");
+        const double share = std::pow(0.97 / 2, 1 + static_cast<double>(steps));
+        EXPECT_NEAR(remedy.changes[0].to, 8 * std::sqrt(share), 0.0101);  // whole hundredths, rounded down
+    }
+}
+
+TEST(CoarseExposure, NamesTheSetThatAsksForIt) {
+    Scene scene;
+    scene.file = "level.glb";
+    scene.light_sets = {{"hall", 1}, {"sun", 1e11f}};
+    EXPECT_FALSE(coarseExposure(scene, 0x1p-14f));  // 1 lux is the smallest that is stored well
+    EXPECT_FALSE(coarseExposure(scene, 64));
+    const auto warning = coarseExposure(scene, 0x1p-30f);
+    ASSERT_TRUE(warning);
+    EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("6.55e+04 lux"), HasSubstr("'sun'"),
+                                         HasSubstr("1e+11")));
+    scene.light_sets.clear();
+    EXPECT_THAT(*coarseExposure(scene, 0x1p-30f), HasSubstr("intensity"));
 }
 
 // Grids of 64, 27 and 8 probes may have 60 in all: 26 + 26 + 8.

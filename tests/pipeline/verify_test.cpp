@@ -109,6 +109,20 @@ TEST(Verify, AWrongPackIsFoundWrong) {
     EXPECT_TRUE(report->converged);
 }
 
+// A set that a game can only dim: without a state, pack and reference show it at its maximum.
+TEST(Verify, ASetOfSmallMaximumIsHeldAgainstTheSame) {
+    Scene scene = furnace();
+    scene.light_sets[0].max_weight = 0.25f;
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    SilentProgress progress;
+    const auto report = verify(scene, *pack, quick(), progress);
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_LE(report->surface.mean, 0.03);
+    ASSERT_EQ(report->sets.size(), 1u);
+    EXPECT_LE(report->sets[0].effect.error, 0.05);
+}
+
 TEST(Verify, AnswersWhatItCannotMeasure) {
     const Scene scene = furnace();
     const auto pack = cooked(scene, "draft");
@@ -138,6 +152,13 @@ TEST(ReferenceState, ReadsSetsAndDoors) {
     EXPECT_EQ(state->set_weights[0], glm::vec3(0.5f));
     EXPECT_EQ(state->set_weights[1], glm::vec3(1, 0.5f, 0.25f));
     EXPECT_EQ(state->door_open, (std::vector<bool>{true, false}));
+    scene.light_sets[1].max_weight = 0.5f;
+    EXPECT_EQ(readReferenceState(scene, "")->set_weights, (std::vector{glm::vec3(1), glm::vec3(0.5f)}));
+    for (const char* bad : {"hall=inf", "all=1e38", "hall=nan", "hall=-1", "hall=1.5", "alarm=0.6", "all=1"}) {
+        const auto refused = readReferenceState(scene, bad);
+        ASSERT_FALSE(refused) << bad;
+        EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument) << bad;
+    }
     EXPECT_EQ(readReferenceState(scene, "door:front=0.5").error().code, ErrorCode::InvalidArgument);
     EXPECT_EQ(readReferenceState(scene, "door:side=1").error().code, ErrorCode::NotFound);
 

@@ -59,6 +59,25 @@ TEST(SceneElements, BakeModes) {
                    {"node 'lamp'", "dimmer_bake", "indirect", "direct"});
 }
 
+TEST(SceneElements, KeysOfOtherThingsAreWarnedOf) {
+    LevelFile level = levelWithLamp({{"dimmer_texel_density", 4}});
+    level.node(0)["extras"] = {{"dimmer_bake", "full"}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'floor'", "dimmer_bake"});
+    expectWarning(*scene, {"node 'lamp'", "dimmer_texel_density"});
+    level.node(0)["extras"] = {{"dimmer_bake", "ful"}};
+    expectBadInput(level.import(), {"node 'floor'", "dimmer_bake", "'ful'"});
+}
+
+TEST(SceneElements, DensityHasALimit) {
+    LevelFile level = LevelFile::withFloor();
+    level.node(0)["extras"] = {{"dimmer_texel_density", 256}};
+    EXPECT_TRUE(level.import());
+    level.node(0)["extras"] = {{"dimmer_texel_density", 256.5}};
+    expectBadInput(level.import(), {"node 'floor'", "dimmer_texel_density", "256"});
+}
+
 TEST(SceneElements, BlendersOrientationNodeTakesTheObjectsProperties) {
     LevelFile level = LevelFile::withFloor();
     const int object = level.addNode({{"name", "Lamp"}, {"extras", {{"dimmer_light_set", "hall"}}}});
@@ -259,7 +278,7 @@ TEST(SceneElements, CombinationsOfUnknownElementsAreRefused) {
 }
 
 TEST(SceneElements, NamesThatAStateCannotSayAreRefused) {
-    for (const char* name : {"", "a,b", "a=b", "all", "door:x"})
+    for (const char* name : {" hall", "hall ", " ", "", "a,b", "a=b", "all", "door:x"})
         expectBadInput(levelWithLamp({{"dimmer_light_set", name}}).import(), {"node 'lamp'", name});
 }
 

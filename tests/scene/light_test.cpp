@@ -61,6 +61,9 @@ TEST(SceneLights, BadLightsAreRefused) {
                         {{"type", "point"}, {"color", {1, 1}}},
                         {{"type", "point"}, {"color", {1, -1, 1}}},
                         {{"type", "point"}, {"range", -2}},
+                        {{"type", "point"}, {"range", 0}},
+                        {{"type", "point"}, {"range", "3"}},
+                        {{"type", "point"}, {"intensity", "3"}},
                         {{"type", "spot"}, {"spot", {{"innerConeAngle", 1.0}, {"outerConeAngle", 0.5}}}},
                         {{"type", "spot"}, {"spot", {{"outerConeAngle", 2.0}}}},
                         {{"type", "spot"}, {"spot", {{"innerConeAngle", -0.1}}}}};

@@ -1,0 +1,28 @@
+#include <pipeline/cook_warnings.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace dimmer::cook {
+
+std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
+    constexpr float smallest = 0x1p-14f;  // what both colour formats store with a step of a few per cent
+    constexpr float dark_lux = 1;
+    const float lost_lux = smallest / exposure;
+    if (lost_lux <= dark_lux) return {};
+    const auto sets = std::span(scene.light_sets);
+    const auto largest = std::ranges::max_element(sets, {}, &SceneLightSet::max_weight);
+    const std::string cause = largest != sets.end() && largest->max_weight > 1
+                                  ? fmt::format(
+                                        "light set '{}' has a dimmer_max_weight of {:.3g}; give it the largest that "
+                                        "the game sets",
+                                        largest->name, largest->max_weight)
+                                  : "some light is that bright; correct its intensity";
+    return fmt::format(
+        "{}: light below {:.3g} lux is stored coarsely or as black, to leave room for all sets at their "
+        "largest weight: {}",
+        scene.file, lost_lux, cause);
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,15 @@
+// What a cook says of a level that can be cooked, though not as somebody meant it.
+#pragma once
+
+#include <scene/scene.h>
+
+#include <optional>
+#include <string>
+
+namespace dimmer::cook {
+
+// The exposure leaves room for every set at its largest weight at once; an absurd one leaves the rest of the level
+// black.
+std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
+
+}  // namespace dimmer::cook
