@@ -222,7 +222,7 @@ def cook_seconds(level, quality, folder, *options):
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, text, overlap
 
 
-def sets_table(folder, runs=3):
+def sets_table(folder, runs):
     """What light sets cost: the same lights all always on, in 12 and 24 sets, and with a gather for each set."""
     variants = [("all lights in the base", house_variant(folder, "base", lambda s, i: None), []),
                 ("12 sets", HOUSE, []),
@@ -247,15 +247,15 @@ def sets_table(folder, runs=3):
     return table(["quality", "the house with", "CPU s", "times the base", "rays", "mean overlap"], rows)
 
 
-def doors_table(folder, runs=3):
+def doors_table(folder, runs):
     """What the house's three doors cost: leaves as plain geometry, doors without their pairs, doors as they are."""
     variants = [("no doors", door_variant(folder, "plain", False)),
                 ("3 doors, no combinations", door_variant(folder, "doors", True)),
                 ("3 doors and their pairs", HOUSE)]
     rows = []
-    for quality in ("draft", "preview"):
+    for quality in ("draft", "preview", "final"):
         taken = {name: [] for name, _ in variants}
-        for _ in range(runs):
+        for _ in range(runs if quality != "final" else 1):  # a single cook at final takes as long as all of preview's
             for name, level in variants:
                 taken[name].append(cook_seconds(level, quality, folder))
         first = statistics.median(t[0] for t in taken[variants[0][0]])
@@ -286,6 +286,7 @@ def main():
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
     parser.add_argument("--only", choices=["reference", "packs", "verify", "sets", "doors"], help="one part of it")
+    parser.add_argument("--runs", type=int, default=3, help="cooks of each kind, of which the median counts")
     options = parser.parse_args()
     levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
     if not levels:
@@ -293,9 +294,11 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         if options.only in (None, "sets"):
-            refresh("sets", "`scripts/bench bake --only sets`\n\n" + sets_table(folder))
+            refresh("sets", f"`scripts/bench bake --only sets --runs {options.runs}`\n\n"
+                    + sets_table(folder, options.runs))
         if options.only in (None, "doors"):
-            refresh("doors", "`scripts/bench bake --only doors`\n\n" + doors_table(folder))
+            refresh("doors", f"`scripts/bench bake --only doors --runs {options.runs}`\n\n"
+                    + doors_table(folder, options.runs))
         if levels and options.only in (None, "reference"):
             refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
                     + reference_table(levels, options.paths, folder))

@@ -18,7 +18,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
                                 std::span<const uint8_t> groups, Progress& progress, uint64_t& rays) {
     const size_t receivers = gatherer.texels().size();
     progress.stage("final gather", receivers);
-    const std::vector<float> floors = noiseFloors(series);
+    const std::vector<float> floors = noiseFloors(series, gatherer.paths().groupCount());
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {

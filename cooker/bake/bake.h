@@ -33,6 +33,7 @@ struct BakeSettings {
     float tail_max = 0.002f;                   // stop when what is still to come is below this share of the sum
     float threshold = 0.01f;                   // activity, as a share of a term's mean; see TermReport
     std::vector<float> group_thresholds = {};  // the same for each light group; empty: one for all
+    float door_share = 0.2f;  // 0..1: a term with doors has at least this share of its group's threshold
     uint32_t seed = 1;
     // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
     bool light_grid = true;
@@ -61,8 +62,9 @@ using ReceiverLight = LightOfTerm<Gathered>;
 using ProbeTermLight = LightOfTerm<ProbeLight>;
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
-// the receivers that see one of the doors, by what is stored; the threshold of those is at least their group's own, and
-// that share of the group's light around the door.
+// the receivers that see one of the doors, by what is stored. The threshold of those is a share of what the group's
+// light around the door changes with it (see series.cpp), within limits: at most the group's own threshold, or that
+// share of all of the group's light around the door where this is more; at least BakeSettings::door_share of that.
 struct TermReport {
     uint64_t receivers = 0;  // active ones
     uint64_t measured_over = 0;

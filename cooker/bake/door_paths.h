@@ -9,6 +9,7 @@
 #include <scene/scene.h>
 #include <trace/ray_scene.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -35,6 +36,9 @@ struct Term {
     uint32_t group = always_group;
     std::vector<uint32_t> doors_open, doors_closed;
     bool free() const { return doors_open.empty() && doors_closed.empty(); }
+    bool isAbout(uint32_t door) const {
+        return std::ranges::binary_search(doors_open, door) || std::ranges::binary_search(doors_closed, door);
+    }
 };
 
 // How a leaf stands to light whose path is known so far.

@@ -13,12 +13,17 @@ constexpr uint32_t rounds_min = 4;
 constexpr float normal_95 = 1.96f;
 // Light below this share of its term's mean need not be exact to a share of itself: the error metric's own floor.
 constexpr float noise_floor = 0.01f;
+// Terms with doors are many and faint, and would keep rays going for the others: they need not be exact to a share of
+// less than what the door changes around it on average, a third of Series::threshold_base.
+constexpr float door_noise_floor = 1.0f / 3;
 
 }  // namespace
 
-std::vector<float> noiseFloors(const Series& series) {
+std::vector<float> noiseFloors(const Series& series, uint32_t group_count) {
     std::vector<float> floors;
     for (const TermReport& r : series.reports) floors.push_back(noise_floor * r.mean_lux);
+    for (size_t t = group_count; t < floors.size(); ++t)
+        floors[t] = std::max(floors[t], door_noise_floor * series.threshold_base[t]);
     return floors;
 }
 

@@ -18,7 +18,7 @@ struct FinalGatherOptions {
 };
 
 // Per term, the light that need not be exact to a share of itself.
-std::vector<float> noiseFloors(const Series& series);
+std::vector<float> noiseFloors(const Series& series, uint32_t group_count);
 FinalGatherOptions finalGatherOptions(const BakeSettings& settings, std::span<const float> floors_lux);
 
 // Rays come in rounds of this many; the spread of the rounds' means is the noise.

@@ -66,7 +66,10 @@ glm::vec3 ProbeLight::irradiance(glm::vec3 n) const {
 template <class Light>
 struct Gatherer::Ray {
     using Intake = typename Light::Intake;
-    float density() const { return static_cast<float>(options.rays) * Intake::weight(tangent) / Intake::total; }
+    float density(uint32_t path) const { return Intake::weight(tangent) / alone(path); }
+    // What radiance at the ray's end counts for, where no other kind of ray might have found it.
+    float alone(uint32_t path) const { return Intake::total / static_cast<float>(options.raysOver(path)); }
+    bool forDoors() const { return aim == 0 && i >= options.rays; }
     const GatherFrom& from;
     const GatherOptions& options;
     const SparseLight* outgoing;
@@ -98,14 +101,14 @@ template <class Light>
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                       TermAccumulator<Light>& sum, GatherLinks* links, const DoorAims& aims) const {
     const uint32_t seed = hash(options.seed, from.id);
-    for (uint32_t i = 0; i < options.rays; ++i) {
+    for (uint32_t i = 0; i < options.rays + (rays_.anyLeaf() ? options.door_rays : 0); ++i) {
         const uint32_t index = options.first_ray + i;
         const auto point = static_cast<uint32_t>(index % from.points.size());
         const SamplePoint& origin = from.points[point];
         const TangentFrame frame = frameOf(origin);
         const glm::vec3 d = Light::Intake::direction(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        if (links) links->hits[i] = no_index;
+        if (links && i < options.rays) links->hits[i] = no_index;
         follow<Light>({from, options, outgoing, sum, links, aims, 0, i, point, origin.position_m, world, d},
                       seed + index);
     }
@@ -154,9 +157,10 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
 // Traces a ray and takes what it finds.
 template <class Light>
 void Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
+    if (ray.forDoors() && rays_.leavesAlong(ray.origin, ray.world, far_away_m).count == 0) return;
     const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored);
     const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
-    if (path == no_path) return;
+    if (path == no_path || (path == free_path && ray.forDoors())) return;
     if (hit)
         take(ray, *hit, path);
     else
@@ -166,8 +170,8 @@ void Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
 // From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
 // have found it there.
 template <class Light>
-float Gatherer::shareOf(const Ray<Light>& ray, uint32_t term) const {
-    const float alone = Light::Intake::total / static_cast<float>(ray.options.rays);
+float Gatherer::shareOf(const Ray<Light>& ray, uint32_t path, uint32_t term) const {
+    const float alone = ray.alone(path);
     if (ray.aims.all.empty()) return alone;
     const uint32_t aim = ray.aims.of_term[term];
     if (ray.aim != 0 && ray.aim != aim) return 0;
@@ -177,7 +181,7 @@ float Gatherer::shareOf(const Ray<Light>& ray, uint32_t term) const {
     const Guide& guide = ray.aims.all[index].from_point[ray.point];
     if (guide.empty()) return alone;
     const float by_aim = static_cast<float>(aimed_rays) * guide.pdf(ray.world);
-    const float share = Light::Intake::weight(ray.tangent) / (ray.density() + by_aim);
+    const float share = Light::Intake::weight(ray.tangent) / (ray.density(path) + by_aim);
     if (index < ray.share_of_aim.size()) ray.share_of_aim[index] = share;
     return share;
 }
@@ -188,8 +192,8 @@ void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
     if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
     // An image sky has rays of its own; see sampleSky.
     if (ray.aim && !sky_.empty()) return;
-    const float share = sky_.empty() ? shareOf(ray, term) : Light::Intake::total / static_cast<float>(ray.options.rays);
-    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.density()) * share, ray.weights);
+    const float share = sky_.empty() ? shareOf(ray, path, term) : ray.alone(path);
+    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.density(path)) * share, ray.weights);
 }
 
 // Takes what the leaves along a ray send back. Returns the path on which it goes on behind them.
@@ -203,9 +207,9 @@ uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m) const 
         const float stopped = rays_.alphaAt(hit.triangle, hit.u, hit.v);
         const uint32_t chance = hash(hash(ray.options.seed, ray.from.id), ray.options.first_ray + ray.i);
         if (stopped < 1 && unitFloat(hash(chance, hit.triangle)) >= stopped) continue;
-        if (ray.links) ray.links->doors.push_back(condition / 2);
+        if (ray.links && !ray.forDoors()) ray.links->doors.push_back(condition / 2);
         if (leaf == Leaf::There) {
-            take(ray, hit, path);
+            if (path != free_path || !ray.forDoors()) take(ray, hit, path);
             return no_path;
         }
         if (const uint32_t reflecting = paths_.with(path, condition); reflecting != no_path) take(ray, hit, reflecting);
@@ -232,11 +236,9 @@ void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const 
         const float cos_emitter = std::abs(glm::dot(ray.world, e->normal));
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
-        const float by_hit = ray.density();
+        const float by_hit = ray.density(path);
         if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
-            ray.sum[term].add(e->radiance_cd_m2 * (Light::Intake::total / static_cast<float>(ray.options.rays) *
-                                                   by_hit / (by_hit + by_area)),
-                              ray.weights);
+            ray.sum[term].add(e->radiance_cd_m2 * (ray.alone(path) * by_hit / (by_hit + by_area)), ray.weights);
     }
     uint32_t found = receiverOf(unwrap_, texels_, hit);
     if (found == no_index && !models_.empty())
@@ -246,11 +248,11 @@ void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const 
     if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
     if (!ray.outgoing) return;
     const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
-    const float alone = Light::Intake::total / static_cast<float>(ray.options.rays);
+    const float alone = ray.alone(path);
     for (const TermLight& light : ray.outgoing->row(found)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (term == no_term || !ray.sum.wants(term)) continue;
-        if (const float share = any_aim ? shareOf(ray, term) : alone; share > 0)
+        if (const float share = any_aim ? shareOf(ray, path, term) : alone; share > 0)
             ray.sum[term].add(light.value * share, ray.weights);
     }
 }
@@ -275,9 +277,9 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, T
         const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
         const float weight = Light::Intake::weight(d);
         const auto weights = Light::weightsOf(d);
-        const float by_ray = static_cast<float>(options.rays) * weight / Light::Intake::total;
         forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
+                       const float by_ray = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
                        if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
                            sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), weights);
                    });
@@ -315,15 +317,16 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
             if (from.ignored != no_model && rays_.triangles()[s.triangle].model == from.ignored) continue;
             const float weight = Light::Intake::weight(d), by_area = samples * s.pdf;
-            const float by_hit = static_cast<float>(options.rays) * weight / Light::Intake::total;
             const uint32_t target = rays_.triangles()[s.triangle].condition;
-            forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
-                       s.distance_m * shadow_end_share, [&](float passed, uint32_t path) {
-                           const uint32_t term = paths_.term(range.group, onto(path, from.condition, target));
-                           if (term != no_term && sum.wants(term))
-                               sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)),
-                                             Light::weightsOf(d));
-                       });
+            forEachWay(
+                rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
+                s.distance_m * shadow_end_share, [&](float passed, uint32_t way) {
+                    const uint32_t path = onto(way, from.condition, target);
+                    const uint32_t term = paths_.term(range.group, path);
+                    const float by_hit = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
+                    if (term != no_term && sum.wants(term))
+                        sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)), Light::weightsOf(d));
+                });
         }
     }
 }

@@ -94,9 +94,14 @@ struct GatherOptions {
     uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
+    // More rays by the intake, of which only those that meet a door's leaf are traced on, and only light over paths
+    // that need a door is taken. Not together with aims or rounds.
+    uint32_t door_rays = 0;
     // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
     // all are.
     std::span<const uint32_t> wanted_in_group;
+
+    uint32_t raysOver(uint32_t path) const { return path == free_path ? rays : rays + door_rays; }
 };
 
 // Rays towards one door and what a light group lights through it, for the terms of that guide.
@@ -220,7 +225,7 @@ class Gatherer {
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                      TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim) const;
     template <class Light>
-    float shareOf(const Ray<Light>& ray, uint32_t term) const;
+    float shareOf(const Ray<Light>& ray, uint32_t path, uint32_t term) const;
     uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
     glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float density) const;
     template <class Light>

@@ -1,6 +1,7 @@
 #include <bake/series.h>
 
 #include <bake/direct.h>
+#include <bake/door_surroundings.h>
 #include <bake/sampling.h>
 
 #include <atomic>
@@ -21,41 +22,20 @@ constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
 
+// A term with doors ends at the threshold's share of so many times the mean of what its group changes around the door.
+// What lies below is then about as little of the change as what other terms lose is of their light: the mean counts
+// many receivers that the door hardly changes, theirs only such as are lit straight.
+constexpr float door_change_factor = 3;
+
+// Few rays find their way through a door, and what they find there is spread over the whole room by the bounces that
+// follow, where no later ray mends it. So many times as many look for doors alone.
+constexpr uint32_t door_rays_per_ray = 3;
+
 // After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
 // shrink evenly yet, later there is less to gain.
 constexpr uint32_t rounds_before_leap = 6;
 // Links are random, and each costs a trip to memory: asked for so many links ahead.
 constexpr size_t links_ahead = 8;
-
-// How much light of each group there is around each door: over the receivers that see it, all of the group's terms
-// together.
-class Surroundings {
-   public:
-    Surroundings(const DoorPaths& paths, const Sparse<uint32_t>& doors_seen)
-        : doors_seen_(doors_seen),
-          groups_(paths.groupCount()),
-          sums_(size_t{paths.doorCount()} * groups_),
-          counts_(paths.doorCount()) {
-        for (size_t i = 0; i < doors_seen.rows(); ++i)
-            for (const uint32_t door : doors_seen.row(i)) ++counts_[door];
-    }
-    void add(size_t receiver, uint32_t group, float lux) {
-        for (const uint32_t door : doors_seen_.row(receiver)) sums_[door * groups_ + group] += static_cast<double>(lux);
-    }
-    // Around that of a term's doors where its group is faintest.
-    float mean(const Term& term) const {
-        double least = std::numeric_limits<double>::infinity();
-        for (const auto* doors : {&term.doors_open, &term.doors_closed})
-            for (const uint32_t door : *doors)
-                least = std::min(least, sums_[door * groups_ + term.group] / std::max(counts_[door], 1.0));
-        return static_cast<float>(least);
-    }
-
-   private:
-    const Sparse<uint32_t>& doors_seen_;
-    size_t groups_;
-    std::vector<double> sums_, counts_;  // door, group; door
-};
 
 class Expansion {
    public:
@@ -101,6 +81,7 @@ class Expansion {
         links_.assign(receivers_ * settings_.series_rays, no_index);
         GatherOptions options;
         options.rays = settings_.series_rays;
+        options.door_rays = door_rays_per_ray * settings_.series_rays;
         options.emitter_samples = settings_.emitter_samples;
         options.seed = settings_.seed;
         options.wanted_in_group = followed_in_group_;
@@ -179,12 +160,14 @@ class Expansion {
             std::memcpy(&other, &l, sizeof other);
             entry += other;
         }
+        void add(const TermLight& l, float share) { entry += Four{0, l.value.x, l.value.y, l.value.z} * share; }
         glm::vec3 operator*(float s) const { return glm::vec3(entry[1], entry[2], entry[3]) * s; }
     };
 
     // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
     SparseLight follow(const SparseLight& radiance, const SparseLight& bounced) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
+        constexpr float share_through_doors = 1.0f / (1 + door_rays_per_ray);
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
@@ -197,10 +180,10 @@ class Expansion {
                     if (own == no_condition)
                         for (const TermLight& l : radiance.row(links_[k])) sum[l.term] += l;
                     else
-                        addMoved(radiance.row(links_[k]), free_path, own, sum);
+                        addMoved(radiance.row(links_[k]), free_path, own, 1, sum);
                 }
                 for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
-                    addMoved(radiance.row(link.receiver), link.path, own, sum);
+                    addMoved(radiance.row(link.receiver), link.path, own, share_through_doors, sum);
                 row.clear();
                 for (const uint32_t t : sum.touched())
                     if (const glm::vec3 lux = sum[t] * lux_per_radiance; least_.empty() || luminance(lux) >= least_[t])
@@ -215,9 +198,10 @@ class Expansion {
         });
     }
 
-    void addMoved(std::span<const TermLight> light, uint32_t path, uint32_t own, TermAccumulator<Sum>& sum) const {
+    void addMoved(std::span<const TermLight> light, uint32_t path, uint32_t own, float share,
+                  TermAccumulator<Sum>& sum) const {
         for (const TermLight& l : light)
-            if (const uint32_t term = paths_.moved(l.term, path, own); term != no_term) sum[term] += l;
+            if (const uint32_t term = paths_.moved(l.term, path, own); term != no_term) sum[term].add(l, share);
     }
 
     // visit(receiver, entry of `after`, what `before` has of it), in order.
@@ -326,9 +310,9 @@ class Expansion {
     std::vector<TermReport> thresholds(float most) const {
         std::vector<TermReport> reports(terms_);
         std::vector<double> sums(terms_);
-        Surroundings around(paths_, doors_seen_);
+        DoorSurroundings around(paths_, doors_seen_);
         forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
-            around.add(i, paths_.terms()[t].group, stored);
+            around.add(i, t, stored);
             const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
             if (!counts) return;
             ++reports[t].measured_over;
@@ -339,21 +323,22 @@ class Expansion {
             if (report.measured_over > 0)
                 report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
             if (t == always_group) continue;
-            const float threshold = std::min(settings_.thresholdOf(paths_.terms()[t].group), most);
-            report.threshold_lux = threshold * report.mean_lux;
-            if (t < paths_.groupCount()) continue;
-            const float near = std::max(reports[paths_.terms()[t].group].mean_lux, around.mean(paths_.terms()[t]));
-            report.threshold_lux = std::max(report.threshold_lux, threshold * near);
+            const Term& term = paths_.terms()[t];
+            const float base = term.free() ? report.mean_lux : doorBase(term, reports[term.group].mean_lux, around);
+            report.threshold_lux = std::min(settings_.thresholdOf(term.group), most) * base;
         }
         return reports;
     }
 
+    // Beside the group's other light a door's may be faint, and yet all that there is behind the door.
+    float doorBase(const Term& term, float group_mean_lux, const DoorSurroundings& around) const {
+        const float of_others = std::max(group_mean_lux, around.light(term));
+        return std::clamp(door_change_factor * around.changed(term), settings_.door_share * of_others, of_others);
+    }
+
     bool seesDoorOf(size_t receiver, uint32_t term) const {
-        const auto of_term = [&](uint32_t door) {
-            const Term& t = paths_.terms()[term];
-            return std::ranges::binary_search(t.doors_open, door) || std::ranges::binary_search(t.doors_closed, door);
-        };
-        return std::ranges::any_of(doors_seen_.row(receiver), of_term);
+        return std::ranges::any_of(doors_seen_.row(receiver),
+                                   [&](uint32_t door) { return paths_.terms()[term].isAbout(door); });
     }
 
     void decideActivity() {

@@ -141,6 +141,7 @@ Key bakeSettingsKey(const BakeSettings& s) {
         .add(uint32_t{s.denoise})
         .add(s.bounces_max)
         .add(s.tail_max)
+        .add(s.door_share)
         .add(s.seed)
         .add(uint32_t{s.light_grid})
         .finish();

@@ -220,6 +220,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .bounces_max = quality.bounces,
                           .tail_max = quality.tolerance,
                           .threshold = profile.threshold,
+                          .door_share = profile.door_share,
                           .light_grid = quality.light_grid,
                           .per_set_passes = quality.per_set_passes,
                           .grid = {.probes_max = wantsGrid(profile, scene) ? profile.probes_max : 0,

@@ -44,6 +44,7 @@ struct Profile {
     ColorFormat color_format = ColorFormat::E5B9G9R9;
     DirectionModel direction_model = DirectionModel::Ahd;
     float threshold = 0.01f;                      // activity, see BakeSettings
+    float door_share = 0.2f;                      // of thresholds, see BakeSettings
     uint32_t overlap_max = 0;                     // contributions per receiver, see limitOverlap; 0: no limit
     std::map<std::string, float> set_thresholds;  // for single light sets, by name
     GridMode global_grid = GridMode::Auto;

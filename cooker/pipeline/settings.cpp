@@ -176,6 +176,10 @@ std::vector<Setting> settingsOf(Profile& p) {
         {"lightmaps.model", &p.direction_model, 0, 0,
          "how irradiance falls off over normals: ahd is better where one lamp rules, linear where many mix"});
     list.push_back({"records.threshold", &p.threshold, 0, 1, threshold_what});
+    list.push_back({"records.door_share", &p.door_share, 0, 1,
+                    "how far below its light set's threshold the light that needs a door is kept where it is faint "
+                    "beside the set's other light: down to this share (0..1) of it; 1: no further than other light. "
+                    "Lower keeps what a far lamp sends past a door, in more memory"});
     list.push_back(
         {"records.overlap_max", &p.overlap_max, 0, 4096,
          "contributions that one texel or probe holds at most, the brightest there; 0: no limit. Bounds what "

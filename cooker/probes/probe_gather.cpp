@@ -19,7 +19,7 @@ ProbeGather::ProbeGather(const Gatherer& gatherer, const LightGrid& lights, cons
       lights_(lights),
       series_(series),
       settings_(settings),
-      floors_(noiseFloors(series)),
+      floors_(noiseFloors(series, gatherer.paths().groupCount())),
       options_(finalGatherOptions(settings, floors_)),
       final_(gatherer_),
       sum_(gatherer_.paths().termCount()),

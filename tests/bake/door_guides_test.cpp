@@ -111,5 +111,81 @@ TEST(DoorGuides, AreUnbiasedAndLessNoisyAtEqualRays) {
     EXPECT_GE(std::exp(log_gain / n), 5);
 }
 
+// A black room of 2 m x 2 m x 2 m whose ceiling has a hatch of 0.8 m x 1 m. Above it the sky, or a panel that hides it.
+constexpr float hatch_x_m = 0.4f, hatch_z_m = 0.5f;
+Scene hatch(bool panel) {
+    Scene scene;
+    const uint32_t black = addMaterial(scene, lambert(0));
+    addFloor(scene, 1, black, -1);
+    for (const float side : {-1.0f, 1.0f}) {
+        addQuad(scene, "wall", {side, 0, 0}, {0, 0, side}, {0, 1, 0}, black);
+        addQuad(scene, "wall", {0, 0, side}, {-side, 0, 0}, {0, 1, 0}, black);
+        const float half_x = (1 - hatch_x_m) / 2, half_z = (1 - hatch_z_m) / 2;
+        addQuad(scene, "ceiling", {side * (1 - half_x), 1, 0}, {half_x, 0, 0}, {0, 0, 1}, black);
+        addQuad(scene, "ceiling", {0, 1, side * (1 - half_z)}, {hatch_x_m, 0, 0}, {0, 0, half_z}, black);
+    }
+    scene.doors = {{"hatch", false}};
+    addQuad(scene, "leaf", {0, 1, 0}, {hatch_x_m, 0, 0}, {0, 0, hatch_z_m}, black).door = 0;
+    scene.light_sets = {{"panel", 1}};
+    if (panel) {
+        const uint32_t glow = addMaterial(scene, emissive(glm::vec3(1)));
+        addQuad(scene, "panel", {0, 1.001f, 0}, {1, 0, 0}, {0, 0, 1}, glow).light_set = 0;
+    } else {
+        scene.sky_radiance_cd_m2 = glm::vec3(1);
+    }
+    return scene;
+}
+
+// Rays that look for doors alone, beside few others: what comes straight through the hatch has a closed form, whether
+// rays find it alone (the sky) or together with samples of the emitter.
+TEST(DoorRays, FindWhatAnOpeningShowsWithLessNoise) {
+    for (const bool panel : {false, true}) {
+        BakedScene b(hatch(panel), 12);
+        const DoorPaths paths(b.scene);
+        const EmitterSampler emitters(*b.rays, meshGroups(b.scene));
+        const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
+        const uint32_t through = paths.term(panel ? 1 : always_group, paths.with(free_path, 1));
+        double mean[2] = {}, variance[2] = {};
+        size_t count = 0;
+        for (size_t i = 0; i < b.texels.size(); ++i) {
+            if (b.meshOf(i) != "floor") continue;
+            // Four corners of the hatch, of which the point lies below the middle or beside it.
+            const double expected = pi_d * b.mean(i, [](glm::dvec3 p) {
+                double sum = 0;
+                for (const double sx : {-1.0, 1.0})
+                    for (const double sz : {-1.0, 1.0}) {
+                        const double x = static_cast<double>(hatch_x_m) + sx * p.x,
+                                     z = static_cast<double>(hatch_z_m) + sz * p.z;
+                        sum += (x * z > 0 ? 1 : -1) * cornerFormFactor(std::abs(x), std::abs(z), 2);
+                    }
+                return sum;
+            });
+            ++count;
+            for (const uint32_t seed : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u})
+                for (const bool more : {false, true}) {
+                    TermAccumulator<Gathered> sum(paths.termCount());
+                    gatherer.gather(gatherer.at(i),
+                                    {.rays = 16,
+                                     .emitter_samples = panel ? 1u : 0u,
+                                     .seed = seed,
+                                     .door_rays = more ? 48u : 0u,
+                                     .wanted_in_group = {}},
+                                    nullptr, sum, nullptr);
+                    const double ratio = static_cast<double>(sum[through].irradiance_lux.x) / expected;
+                    mean[more] += ratio;
+                    variance[more] += (ratio - 1) * (ratio - 1);
+                }
+        }
+        const double n = 8 * static_cast<double>(count);
+        printf("%s: %zu texels, mean %.4f and with door rays %.4f, variance %.4f and %.4f\n", panel ? "panel" : "sky",
+               count, mean[0] / n, mean[1] / n, variance[0] / n, variance[1] / n);
+        ASSERT_GT(count, 400u);
+        for (const bool more : {false, true})
+            EXPECT_NEAR(mean[more] / n, 1, 4 * std::sqrt(variance[more]) / n) << panel << more;
+        // Four times the rays: a quarter at random. Samples of the panel, of which there are no more, share its work.
+        EXPECT_LT(variance[1], (panel ? 0.7 : 0.4) * variance[0]) << panel;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

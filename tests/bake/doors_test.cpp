@@ -278,5 +278,59 @@ TEST(Doors, PairsThatDependOnEachOtherAreFound) {
     EXPECT_NEAR(static_cast<double>(first.loss) / (together / std::min(alone[0], alone[1])), 1, 0.1);
 }
 
+// A bright room, and one of the same size behind a doorway that the lamps of both sets light by a little of their
+// bounces.
+Scene brightAndDark() {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addBox(scene, {4, 1.25f, 2}, white);
+    const auto block = [&](glm::vec3 low, glm::vec3 high, std::optional<uint32_t> door = {}) {
+        addSolid(scene, door ? "leaf" : "partition", 0.5f * (low + high), 0.5f * (high - low), white, door);
+    };
+    block({-0.1f, -1.25f, -2}, {0.1f, 1.25f, -0.25f});
+    block({-0.1f, -1.25f, 0.25f}, {0.1f, 1.25f, 2});
+    block({-0.1f, -0.25f, -0.25f}, {0.1f, 1.25f, 0.25f});
+    scene.doors = {{"door", false}};
+    block({-0.05f, -1.25f, -0.25f}, {0.05f, -0.25f, 0.25f}, 0);
+    scene.light_sets = {{"near", 1}, {"far", 1}};
+    addPointLight(scene, {-1.5f, 0.6f, 1.2f}, 100, BakeMode::Indirect).light_set = 0;
+    addPointLight(scene, {-3.5f, 0.4f, -1.5f}, 100, BakeMode::Indirect).light_set = 1;
+    return scene;
+}
+
+// What the thresholds leave of the light that a door lets into a dark room, each light set alone: against the path
+// tracer. Records that end at the set's own threshold lose much more of it.
+TEST(Doors, FaintLightThroughADoorIsKeptWhereItIsAllThereIs) {
+    const Scene scene = brightAndDark();
+    const auto dark = [](glm::vec3 p) { return p.x > 0.15f; };
+    BakedScene kept(scene), cut(scene);
+    BakeSettings settings{.series_rays = 64, .final_rays = 256, .emitter_samples = 0};
+    kept.bake(settings);
+    settings.door_share = 1;
+    cut.bake(settings);
+    const auto flux = [&](const BakedScene& b, uint32_t set) {
+        double sum = 0;
+        for (size_t i = 0; i < b.texels.size(); ++i)
+            if (dark(b.place(i))) sum += inState(b, i, 1, set).y * static_cast<double>(b.texels.area_m2[i]);
+        return sum;
+    };
+    for (const uint32_t set : {1u, 2u}) {
+        const Compared c = compare(kept, scene, 1, set, 120, 2048, dark);
+        const double error = c.baked / c.reference - 1, noise = c.noise / c.reference,
+                     lost = 1 - flux(cut, set) / flux(kept, set);
+        printf("set %u: sum off by %+.2f %% +- %.2f %%; ending with the set loses %.1f %%\n", set, 100 * error,
+               100 * noise, 100 * lost);
+        // 3 % for what lies below the thresholds, 2 % for the texels' size and the baker's own noise.
+        EXPECT_NEAR(error, 0, 0.05 + 4 * noise) << set;
+        EXPECT_GT(lost, 0.15) << set;
+    }
+    for (size_t t = 0; t < kept.baked.terms.size(); ++t) {
+        if (kept.baked.terms[t].free()) continue;
+        const float least = kept.baked.reports[t].threshold_lux, most = cut.baked.reports[t].threshold_lux;
+        EXPECT_LE(least, most) << t;
+        EXPECT_GE(least, 0.199f * most) << t;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test
