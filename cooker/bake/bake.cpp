@@ -15,27 +15,37 @@ namespace dimmer::cook {
 namespace {
 
 Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                std::span<const uint8_t> groups, Progress& progress, uint64_t& rays) {
+                                std::span<const uint8_t> groups, Progress& progress, uint64_t& rays, RayEnds* ends) {
     const size_t receivers = gatherer.texels().size();
     progress.stage("final gather", receivers);
     const std::vector<float> floors = noiseFloors(series, gatherer.paths().groupCount());
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
+    const bool remembers = ends && ends->rows() == 0;
+    if (remembers) *ends = RayEnds(receivers, static_cast<uint32_t>(gatherer.receiverCount()));
+    const RayEnds* known = remembers ? nullptr : ends;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
         FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
-        std::vector<uint32_t> terms;
+        std::vector<uint32_t> terms, own_ends;
+        std::vector<std::vector<uint32_t>> all_ends;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
             series.activeTerms(i, terms);
             std::erase_if(terms, [&](uint32_t t) { return !groups[gatherer.paths().terms()[t].group]; });
             row.clear();
-            if (!settings.per_set_passes) traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row);
+            own_ends.clear();
+            if (known && !terms.empty()) known->get(i, own_ends);
+            if (!settings.per_set_passes)
+                traced +=
+                    gather.gather(gatherer.at(i), terms, series.radiance, options, row, ends ? &own_ends : nullptr);
+            if (remembers) all_ends.push_back(own_ends);
             for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
                 traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
             for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));
         }
+        if (remembers) ends->putBlock(begin / rows_per_block, all_ends);
         all_traced += traced;
         progress.advance(end - begin);
     });
@@ -69,14 +79,16 @@ struct FollowedLight {
     std::vector<uint32_t> bounces;  // per group
 };
 
-// Fills `baked` with the light of the groups whose turn it is.
+// Fills `baked` with the light of the groups whose turn it is. `rays`: may be null.
 FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings, const Turns& turns, Progress& progress,
-                         Baked& baked) {
-    Series series = expandSeries(gatherer, settings, progress, turns.follow);
+                         RememberedRays* rays, Baked& baked) {
+    RayEnds* const links = rays ? &rays->links : nullptr;
+    Series series = expandSeries(gatherer, settings, progress, turns.follow, links);
     baked.rays = series.rays;
     if (std::ranges::count(turns.bake, 1) > 0) {
-        baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress);
-        baked.light = gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays);
+        baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress, links);
+        baked.light =
+            gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays, rays ? &rays->gather : nullptr);
         baked.local_light =
             bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays, baked.warnings);
     }
@@ -181,12 +193,26 @@ class Bake {
     }
 
     void followGroups() {
-        followed_ = bakeGroups(gatherer(), settings_, turns_, progress_, baked_);
+        const bool remembers = store_ && !settings_.per_set_passes;
+        RememberedRays rays;
+        if (remembers) findRays(rays);
+        const bool fresh_links = rays.links.rows() == 0, fresh_gather = rays.gather.rows() == 0;
+        // Only where every receiver is gathered from are there rays from all of them.
+        const bool all = turns_.bake[always_group];
+        followed_ = bakeGroups(gatherer(), settings_, turns_, progress_, remembers ? &rays : nullptr, baked_);
+        if (remembers && fresh_links) store_->keepRays("links", {}, rays.links);
+        if (remembers && fresh_gather && all) store_->keepRays("gather", {}, rays.gather);
         for (uint32_t g = 0; store_ && g < groups_; ++g) {
             if (turns_.bake[g]) store_->keep(g, lightOfGroup(baked_, paths_, g, followed_.bounces[g]));
             if (turns_.follow[g] && settings_.grid.probes_max > 0)
                 store_->keepRadiance(g, radianceOfGroup(followed_.radiance, paths_, g));
         }
+    }
+
+    void findRays(RememberedRays& rays) {
+        const auto receivers = static_cast<uint32_t>(gatherer().receiverCount());
+        if (auto links = store_->findRays("links", {}, receivers, receivers)) rays.links = std::move(*links);
+        if (auto ends = store_->findRays("gather", {}, texels_.size(), receivers)) rays.gather = std::move(*ends);
     }
 
     void makeGrid() {

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace dimmer::cook {
@@ -153,6 +154,12 @@ class GroupStore {
     // Series::radiance, of the group's own terms: what light at new places is gathered from.
     virtual std::optional<SparseLight> findRadiance(uint32_t group) = 0;
     virtual void keepRadiance(uint32_t group, const SparseLight& radiance) = 0;
+
+    // Where rays of some kind end, from so many rows, that may read so many receivers. `places`: what they start from,
+    // where that is no receiver of the level.
+    virtual std::optional<RayEnds> findRays(std::string_view kind, std::span<const glm::vec3> places, size_t rows,
+                                            uint32_t receivers) = 0;
+    virtual void keepRays(std::string_view kind, std::span<const glm::vec3> places, const RayEnds& ends) = 0;
 };
 
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between

@@ -53,7 +53,7 @@ std::vector<uint32_t> doorsOf(const Term& term) {
 }  // namespace
 
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                               std::span<const uint8_t> groups, Progress& progress) {
+                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links) {
     Scene named = gatherer.rays().scene();
     const auto pairs = seenTogether(named, series.doors_seen);
     std::vector<DoorFlux> flux(groups.size());
@@ -61,7 +61,8 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
     for (const Pair& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
     const DoorPaths paths(named);
     const Gatherer keeping_pairs(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), gatherer.emitters(), paths);
-    const Series measured = expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups);
+    const Series measured =
+        expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
 
     for (DoorFlux& f : flux) {
         f.alone.resize(named.doors.size());

@@ -8,9 +8,10 @@
 namespace dimmer::cook {
 
 // Per light group; of groups that are not asked for, nothing. `series` is the bake's own. Measured by another of few
-// rays that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing.
+// rays that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing. `links`: as
+// expandSeries() has them.
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                               std::span<const uint8_t> groups, Progress& progress);
+                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links = nullptr);
 
 // The pairs whose loss, over all groups, is above the threshold, the largest first.
 std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeSettings& settings);

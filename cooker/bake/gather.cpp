@@ -13,6 +13,8 @@ namespace {
 
 // Shadow rays stop this short of the emitter they aim at, so as not to hit it.
 constexpr float shadow_end_share = 1 - 1e-4f;
+// Where rays end is known before the light there is asked for: so many rays ahead it begins to load.
+constexpr uint32_t rays_ahead = 8;
 
 // Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
 uint32_t firstSample(const GatherOptions& options) {
@@ -103,14 +105,24 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
     const uint32_t seed = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.rays + (rays_.anyLeaf() ? options.door_rays : 0); ++i) {
         const uint32_t index = options.first_ray + i;
+        const uint32_t end = i < options.ends.size() ? options.ends[i] : RayEnd::again;
+        const bool known = end < RayEnd::again;
+        if (links && i < options.rays) links->hits[i] = known && end < RayEnd::nothing ? end : no_index;
+        if (const uint32_t ahead = i + rays_ahead; outgoing && ahead < options.ends.size())
+            if (options.ends[ahead] < RayEnd::nothing) outgoing->prefetch(options.ends[ahead]);
+        if (known && !brings(end, from, outgoing, sum)) continue;
         const auto point = static_cast<uint32_t>(index % from.points.size());
         const SamplePoint& origin = from.points[point];
         const TangentFrame frame = frameOf(origin);
         const glm::vec3 d = Light::Intake::direction(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        if (links && i < options.rays) links->hits[i] = no_index;
-        follow<Light>({from, options, outgoing, sum, links, aims, 0, i, point, origin.position_m, world, d},
-                      seed + index);
+        const Ray<Light> ray{from, options, outgoing, sum, links, aims, 0, i, point, origin.position_m, world, d};
+        if (known && end == RayEnd::sky)
+            takeSky(ray, free_path);
+        else if (known)
+            takeFrom(ray, end, free_path);
+        else if (const uint32_t found = follow(ray, seed + index); end == RayEnd::unknown)
+            options.ends[i] = found;
     }
     for (size_t a = 0; a < aims.all.size(); ++a)
         if (aims.wanted[a] > 0) gatherAimed(from, options, outgoing, sum, aims, a);
@@ -154,17 +166,37 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
     }
 }
 
-// Traces a ray and takes what it finds.
+// Whether a ray with a known end can bring anything that is wanted.
 template <class Light>
-void Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
-    if (ray.forDoors() && rays_.leavesAlong(ray.origin, ray.world, far_away_m).count == 0) return;
+bool Gatherer::brings(uint32_t end, const GatherFrom& from, const SparseLight* outgoing,
+                      const TermAccumulator<Light>& sum) const {
+    if (end == RayEnd::nothing) return false;
+    if (end == RayEnd::sky) {
+        const uint32_t term = paths_.term(always_group, free_path);
+        return term != no_term && sum.wants(term);
+    }
+    if (!outgoing) return false;
+    const auto light = outgoing->row(end);
+    if (from.condition != no_condition) return !light.empty();
+    return std::ranges::any_of(light, [&](const TermLight& l) { return sum.wants(l.term); });
+}
+
+// Traces a ray and takes what it finds. Returns where it ended.
+template <class Light>
+uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
+    if (ray.forDoors() && rays_.leavesAlong(ray.origin, ray.world, far_away_m).count == 0) return RayEnd::again;
     const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored);
-    const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m) : free_path;
-    if (path == no_path || (path == free_path && ray.forDoors())) return;
-    if (hit)
-        take(ray, *hit, path);
-    else
+    bool any_leaf = false;
+    const uint32_t path =
+        rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m, any_leaf) : free_path;
+    if (path == no_path || (path == free_path && ray.forDoors())) return RayEnd::again;
+    if (!hit) {
         takeSky(ray, path);
+        return any_leaf ? RayEnd::again : RayEnd::sky;
+    }
+    const uint32_t found = take(ray, *hit, path);
+    if (any_leaf || emitters_.emitterOf(hit->triangle)) return RayEnd::again;
+    return found == no_index ? RayEnd::nothing : found;
 }
 
 // From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
@@ -196,11 +228,13 @@ void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
     if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.density(path)) * share, ray.weights);
 }
 
-// Takes what the leaves along a ray send back. Returns the path on which it goes on behind them.
+// Takes what the leaves along a ray send back, and says whether there are any. Returns the path on which it goes on
+// behind them.
 template <class Light>
-uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m) const {
+uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m, bool& any) const {
     uint32_t path = free_path;
     for (const Hit& hit : rays_.leavesAlong(ray.origin, ray.world, distance_m)) {
+        any = true;
         const uint32_t condition = rays_.triangles()[hit.triangle].condition;
         const Leaf leaf = paths_.leaf(path, ray.from.condition, condition);
         if (leaf == Leaf::Absent) continue;
@@ -228,9 +262,9 @@ uint32_t Gatherer::modelReceiverAt(const Hit& hit, uint32_t chance) const {
     return found == no_index ? no_index : static_cast<uint32_t>(texels_.size()) + found;
 }
 
-// Takes the light of the surface at a ray's end.
+// Takes the light of the surface at a ray's end. Returns the receiver that it read.
 template <class Light>
-void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const {
+uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const {
     // Emitters have rays of their own; see sampleEmitters.
     if (const Emitter* e = emitters_.emitterOf(hit.triangle); !ray.aim && e && (!hit.back || e->double_sided)) {
         const float cos_emitter = std::abs(glm::dot(ray.world, e->normal));
@@ -243,13 +277,18 @@ void Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const 
     uint32_t found = receiverOf(unwrap_, texels_, hit);
     if (found == no_index && !models_.empty())
         found = modelReceiverAt(hit, hash(hash(ray.options.seed, ray.from.id), ray.options.first_ray + ray.i));
-    if (found == no_index) return;
+    if (found == no_index) return no_index;
     if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
     if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
-    if (!ray.outgoing) return;
+    if (ray.outgoing) takeFrom(ray, found, path);
+    return found;
+}
+
+template <class Light>
+void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path) const {
     const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
     const float alone = ray.alone(path);
-    for (const TermLight& light : ray.outgoing->row(found)) {
+    for (const TermLight& light : ray.outgoing->row(receiver)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (term == no_term || !ray.sum.wants(term)) continue;
         if (const float share = any_aim ? shareOf(ray, path, term) : alone; share > 0)

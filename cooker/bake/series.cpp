@@ -40,7 +40,7 @@ constexpr size_t links_ahead = 8;
 class Expansion {
    public:
     Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-              std::span<const uint8_t> groups)
+              std::span<const uint8_t> groups, RayEnds* ends)
         : gatherer_(gatherer),
           receivers_(gatherer.receiverCount()),
           settings_(settings),
@@ -48,6 +48,7 @@ class Expansion {
           grid_(gatherer.rays(), settings.light_grid, groups),
           paths_(gatherer.paths()),
           terms_(paths_.termCount()),
+          ends_(ends),
           running_(groups.begin(), groups.end()) {
         if (running_.empty()) running_.assign(paths_.groupCount(), 1);
         followed_in_group_.resize(paths_.groupCount());
@@ -79,6 +80,9 @@ class Expansion {
     void directPass() {
         progress_.stage("direct light and links", receivers_);
         links_.assign(receivers_ * settings_.series_rays, no_index);
+        const bool remembers = ends_ && ends_->rows() == 0;
+        if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_));
+        const RayEnds* known = remembers ? nullptr : ends_;
         GatherOptions options;
         options.rays = settings_.series_rays;
         options.door_rays = door_rays_per_ray * settings_.series_rays;
@@ -95,8 +99,14 @@ class Expansion {
             std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
             GatherLinks links;
+            std::vector<uint32_t> ends;
+            std::vector<std::vector<uint32_t>> all_ends;
+            GatherOptions own_options = options;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
+                ends.assign(ends_ ? options.rays : 0, RayEnd::unknown);
+                if (known) known->get(i, ends);
+                own_options.ends = ends.size() < options.rays ? std::span<uint32_t>{} : std::span(ends);
                 traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
@@ -108,7 +118,8 @@ class Expansion {
                     if (luminance(full[t].irradiance_lux) > 0) stored_row.push_back({t, full[t]});
                 full.clear();
                 links = {{&links_[i * settings_.series_rays], settings_.series_rays}, {}, {}};
-                gatherer_.gather(gatherer_.at(i), options, nullptr, sum, &links);
+                gatherer_.gather(gatherer_.at(i), own_options, nullptr, sum, &links);
+                if (remembers) all_ends.push_back(ends);
                 std::ranges::sort(links.doors);
                 links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
                 door_links.put(i, links.through_doors);
@@ -118,6 +129,7 @@ class Expansion {
                 left_to_renderer.put(i, left_row);
                 stored.put(i, stored_row);
             }
+            if (remembers) ends_->putBlock(begin / rows_per_block, all_ends);
             rays_traced_ += traced;
             progress_.advance(end - begin);
         });
@@ -389,6 +401,7 @@ class Expansion {
     LightGrid grid_;
     const DoorPaths& paths_;
     uint32_t terms_;
+    RayEnds* ends_;                            // may be null
     std::vector<uint8_t> running_;             // per light group: its light is still followed
     std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
     std::vector<uint32_t> links_;              // series_rays per receiver
@@ -427,8 +440,8 @@ void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
 }
 
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-                    std::span<const uint8_t> groups) {
-    return Expansion(gatherer, settings, progress, groups).run();
+                    std::span<const uint8_t> groups, RayEnds* links) {
+    return Expansion(gatherer, settings, progress, groups, links).run();
 }
 
 }  // namespace dimmer::cook

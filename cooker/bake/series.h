@@ -36,8 +36,8 @@ struct Series {
 
 // Deterministic for any number of threads, and each light group's part is the same whichever others there are.
 // Memory while it runs: 4 bytes * series_rays per texel. `groups`: per light group, whether to follow its light; empty:
-// all.
+// all. `links`: where the rays end, where that is known, to be filled in where it is empty; at least series_rays each.
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-                    std::span<const uint8_t> groups = {});
+                    std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
 
 }  // namespace dimmer::cook

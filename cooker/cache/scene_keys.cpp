@@ -174,6 +174,20 @@ Key groupKey(const Key& charts, const Key& settings, float threshold, const Key&
     return KeyBuilder("light").add(charts).add(settings).add(threshold).add(lamps).finish();
 }
 
+Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene) {
+    KeyBuilder key("scene of rays");
+    key.add(charts).add(settings);
+    for (uint32_t m = 0; m < scene.meshes.size(); ++m)
+        for (uint32_t t = 0; t < scene.meshes[m].triangle_materials.size(); ++t)
+            if (scene.materials[scene.meshes[m].triangle_materials[t]].emission_cd_m2 != glm::vec3(0))
+                key.add(m).add(t);
+    return key.finish();
+}
+
+Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> places) {
+    return KeyBuilder("rays").add(scene).add(kind).addArray(places).finish();
+}
+
 Key gridSettingsKey(const GridSettings& s, const Scene& scene) {
     KeyBuilder key("grid settings");
     key.add(s.probes_max).add(s.min_spacing_m).add(s.sites).add(s.tolerance);

@@ -7,6 +7,7 @@
 #include <scene/scene.h>
 
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace dimmer::cook {
@@ -28,6 +29,11 @@ Key lampsKey(const Scene& scene, uint32_t group);
 
 // A group's finished light, and what else is kept of it.
 Key groupKey(const Key& charts, const Key& settings, float threshold, const Key& lamps);
+
+// What the rays of a bake meet: everything but light, and which faces are emitters.
+Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene);
+// Of some rays, from `places` where they start from no receivers.
+Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> places);
 
 // What the global grid depends on besides the groups' light.
 Key gridSettingsKey(const GridSettings& settings, const Scene& scene);

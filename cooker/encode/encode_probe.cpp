@@ -48,19 +48,34 @@ void rotate(Quadric& f, size_t p, size_t q) {
     turn(f.b[p], f.b[q]);
 }
 
-// Turned into the frame of A's eigenvectors.
+double squareOf(const std::array<double, 3>& v) {
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
+}
+
+// Turned into the frame of A's eigenvectors, as closely as the floats of its light are known.
 void diagonalise(Quadric& f) {
+    constexpr double enough = 1e-24;  // squared
+    const double square = squareOf(f.a[0]) + squareOf(f.a[1]) + squareOf(f.a[2]);
     for (int sweep = 0; sweep < jacobi_sweeps_max; ++sweep) {
-        if (f.a[0][1] == 0 && f.a[0][2] == 0 && f.a[1][2] == 0) return;
+        if (squareOf({f.a[0][1], f.a[0][2], f.a[1][2]}) <= enough * square) return;
         rotate(f, 0, 1);
         rotate(f, 0, 2);
         rotate(f, 1, 2);
     }
 }
 
+// Whether that needs no closer look: the least is at least c - |b| + A's least eigenvalue, which lies at most
+// sqrt(2/3) of the norm of A's traceless part below their mean (Wolkowicz and Styan 1980).
+bool surelyPositive(const ProbeLight& light, int channel) {
+    const Quadric f = quadricOf(light, channel);
+    const double mean = (f.a[0][0] + f.a[1][1] + f.a[2][2]) / 3;
+    const double square = squareOf(f.a[0]) + squareOf(f.a[1]) + squareOf(f.a[2]) - 3 * mean * mean;
+    return f.c + mean - std::sqrt(squareOf(f.b)) - std::sqrt(std::max(0.0, square) * 2 / 3) > 0;
+}
+
 bool negativeSomewhere(const ProbeLight& light) {
     for (int channel = 0; channel < 3; ++channel)
-        if (leastIrradiance(light, channel) < 0) return true;
+        if (!surelyPositive(light, channel) && leastIrradiance(light, channel) < 0) return true;
     return false;
 }
 
@@ -127,6 +142,7 @@ ProbeLight flattened(const ProbeLight& light, float share) {
 float positiveShare(const ProbeLight& light) {
     float share = 1;
     for (int channel = 0; channel < 3; ++channel) {
+        if (surelyPositive(light, channel)) continue;
         const float mean = light.irradiance()[channel], least = leastIrradiance(light, channel);
         if (least < 0) share = std::min(share, mean / (mean - least));
     }

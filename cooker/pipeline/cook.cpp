@@ -199,7 +199,7 @@ Baked bakeWithCache(const Charted& level, BakeSettings settings, const SetScales
     const Key grid_settings = gridSettingsKey(settings.grid, scene);
     cache->dependsOn("settings of the grid", grid_settings);
     const Key grid = gridKey(grid_settings, keys);
-    CachedGroups groups(*cache, scene, std::move(keys), grid);
+    CachedGroups groups(*cache, scene, std::move(keys), grid, sceneRaysKey(level.key, settings_key, scene));
     return bake(*level.rays, level.charts, level.texels, settings, progress, &groups);
 }
 

@@ -12,7 +12,7 @@ namespace dimmer::cook {
 namespace {
 
 constexpr std::string_view charts_kind = "charts", light_kind = "light", pack_kind = "pack", ledger_kind = "ledger",
-                           grid_kind = "grid", sites_kind = "sites", radiance_kind = "radiance";
+                           grid_kind = "grid", sites_kind = "sites", radiance_kind = "radiance", rays_kind = "rays";
 
 std::vector<std::byte> toBytes(const PackEntry& entry) {
     format::ByteWriter out;
@@ -162,6 +162,15 @@ std::optional<SparseLight> CookCache::findRadiance(const Key& key) {
 
 void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
     keep(radiance_kind, key, cook::toBytes(radiance));
+}
+
+std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers) {
+    const Entry entry = store_.find(rays_kind, key);
+    return entry.find == Find::Hit ? RayEnds::fromBytes(entry.bytes, rows, receivers) : std::nullopt;
+}
+
+void CookCache::keepRays(const Key& key, const RayEnds& ends) {
+    keep(rays_kind, key, ends.toBytes());
 }
 
 void CookCache::finish(uint64_t bytes_max) {

@@ -49,6 +49,9 @@ class CookCache {
     void keepSites(const Key& key, std::span<const SiteBlockLight> sites);
     std::optional<SparseLight> findRadiance(const Key& key);
     void keepRadiance(const Key& key, const SparseLight& radiance);
+    // Where rays end.
+    std::optional<RayEnds> findRays(const Key& key, size_t rows, uint32_t receivers);
+    void keepRays(const Key& key, const RayEnds& ends);
 
     // Ends the cook: removes old entries, and remembers what this one depended on.
     void finish(uint64_t bytes_max);
@@ -73,9 +76,9 @@ class CookCache {
 // The groups of one bake.
 class CachedGroups final : public GroupStore {
    public:
-    // `keys`: per light group.
-    CachedGroups(CookCache& cache, const Scene& scene, std::vector<Key> keys, const Key& grid)
-        : cache_(cache), scene_(scene), keys_(std::move(keys)), grid_(grid) {}
+    // `keys`: per light group; `rays`: what rays depend on.
+    CachedGroups(CookCache& cache, const Scene& scene, std::vector<Key> keys, const Key& grid, const Key& rays)
+        : cache_(cache), scene_(scene), keys_(std::move(keys)), grid_(grid), rays_(rays) {}
     std::optional<GroupLight> find(uint32_t group) override;
     void keep(uint32_t group, const GroupLight& light) override { cache_.keepGroup(keys_[group], light); }
     std::optional<BakedGrid> findGrid() override;
@@ -88,12 +91,19 @@ class CachedGroups final : public GroupStore {
     void keepRadiance(uint32_t group, const SparseLight& radiance) override {
         cache_.keepRadiance(keys_[group], radiance);
     }
+    std::optional<RayEnds> findRays(std::string_view kind, std::span<const glm::vec3> places, size_t rows,
+                                    uint32_t receivers) override {
+        return cache_.findRays(raysKey(rays_, kind, places), rows, receivers);
+    }
+    void keepRays(std::string_view kind, std::span<const glm::vec3> places, const RayEnds& ends) override {
+        cache_.keepRays(raysKey(rays_, kind, places), ends);
+    }
 
    private:
     CookCache& cache_;
     const Scene& scene_;
     std::vector<Key> keys_;
-    Key grid_;
+    Key grid_, rays_;
 };
 
 // "always-on light" or "light set 'hall'".

@@ -142,19 +142,21 @@ class PlaceTrace {
         }
     }
 
-    // Adds what is active there, ascending. Returns the rays traced.
-    uint64_t trace(glm::vec3 place, uint32_t rays, std::vector<ProbeTermLight>& row) {
+    // Adds what is active there, ascending. `ends`: of the rays, as GatherOptions has them. Returns the rays traced.
+    uint64_t trace(glm::vec3 place, uint32_t rays, std::span<uint32_t> ends, std::vector<ProbeTermLight>& row) {
         const SamplePoint point{place, no_face};
         // A place has noise of its own wherever it stands in whatever list.
         uint32_t seed = site_seed;
         for (int c = 0; c < 3; ++c) seed = hash(seed, std::bit_cast<uint32_t>(place[c]));
         const GatherFrom from = Gatherer::atProbe(point, seed);
         const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, sum_);
+        const bool known = !ends.empty() && ends[0] != RayEnd::unknown;
         gatherer_.gather(from,
                          {.rays = rays,
                           .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
                           .seed = settings_.seed + 2,
-                          .wanted_in_group = wanted_in_group_},
+                          .wanted_in_group = wanted_in_group_,
+                          .ends = ends},
                          &radiance_, sum_, nullptr);
         if (sum_.wants(always_group)) sum_[always_group];  // every site has some
         for (const uint32_t t : direct_.touched())
@@ -167,7 +169,7 @@ class PlaceTrace {
         }
         sum_.clear();
         direct_.clear();
-        return shadow_rays + rays;
+        return shadow_rays + (known ? 0 : rays);
     }
 
    private:
@@ -178,6 +180,48 @@ class PlaceTrace {
     const BakeSettings& settings_;
     TermAccumulator<ProbeLight> sum_, direct_;
     std::vector<uint32_t> wanted_in_group_;
+};
+
+// Where the rays of blocks of places end: what a store knows, and what it is to know.
+class SiteRays {
+   public:
+    SiteRays(std::span<const SiteBlock> all, std::span<const size_t> blocks, GroupStore* store, uint32_t receivers)
+        : all_(all), store_(store), receivers_(receivers), known_(all.size()), fresh_(all.size()) {
+        for (const size_t b : blocks) {
+            if (!store) break;
+            if (auto found = store->findRays("places", all[b].places_m, all[b].places_m.size(), receivers))
+                known_[b] = std::move(*found);
+            else
+                fresh_[b].resize(all[b].places_m.size());
+        }
+    }
+    // Replaces `ends`. As take(), for different places at the same time.
+    void get(size_t block, size_t place, std::vector<uint32_t>& ends) const {
+        ends.clear();
+        if (known_[block].rows() > 0) known_[block].get(place, ends);
+        if (store_ && ends.size() != all_[block].rays) ends.assign(all_[block].rays, RayEnd::unknown);
+    }
+    void take(size_t block, size_t place, const std::vector<uint32_t>& ends) {
+        if (!fresh_[block].empty()) fresh_[block][place] = ends;
+    }
+    void keep() {
+        for (size_t b = 0; b < all_.size(); ++b) {
+            if (fresh_[b].empty()) continue;
+            RayEnds ends(fresh_[b].size(), receivers_);
+            for (size_t i = 0; i < blockCount(fresh_[b].size()); ++i) {
+                const size_t begin = i * rows_per_block, end = std::min(begin + rows_per_block, fresh_[b].size());
+                ends.putBlock(i, std::span(fresh_[b]).subspan(begin, end - begin));
+            }
+            store_->keepRays("places", all_[b].places_m, ends);
+        }
+    }
+
+   private:
+    std::span<const SiteBlock> all_;
+    GroupStore* store_;
+    uint32_t receivers_;
+    std::vector<RayEnds> known_;                             // per block
+    std::vector<std::vector<std::vector<uint32_t>>> fresh_;  // per block and place
 };
 
 std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
@@ -267,17 +311,24 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
     for (const auto& [groups, blocks] : passes) {
         std::vector<uint8_t> wanted(light_.size());
         for (const uint32_t g : groups) wanted[g] = 1;
-        std::vector<std::pair<glm::vec3, uint32_t>> places;  // with their rays
+        std::vector<std::pair<size_t, size_t>> places;  // block and row
         for (const size_t b : blocks)
-            for (const glm::vec3& place : blocks_[b].places_m) places.emplace_back(place, blocks_[b].rays);
+            for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) places.emplace_back(b, i);
+        SiteRays rays(blocks_, blocks, store_, static_cast<uint32_t>(gatherer.receiverCount()));
         progress.stage("light at probe sites", places.size());
         std::vector<Row> rows(places.size());
         tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
             PlaceTrace trace(gatherer, lights, radiance, reports, settings, wanted);
-            for (size_t i = range.begin(); i < range.end(); ++i)
-                traced += trace.trace(places[i].first, places[i].second, rows[i]);
+            std::vector<uint32_t> ends;
+            for (size_t i = range.begin(); i < range.end(); ++i) {
+                const auto [b, k] = places[i];
+                rays.get(b, k, ends);
+                traced += trace.trace(blocks_[b].places_m[k], blocks_[b].rays, ends, rows[i]);
+                rays.take(b, k, ends);
+            }
             progress.advance(range.size());
         });
+        rays.keep();
         share(rows, blocks, groups);
     }
     for (uint32_t g = 0; store_ && g < light_.size(); ++g)

@@ -1,5 +1,6 @@
 #include <probes/trial_grid.h>
 
+#include <bake/sampling.h>
 #include <probes/grid_error.h>
 #include <probes/spherical_harmonics.h>
 #include <probes/tetrahedra.h>
@@ -25,6 +26,7 @@ constexpr float search_tolerance = 0.01f;  // of fits on the way: errors that co
 TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
                      const GridSettings& settings)
     : rays_(rays),
+      cells_(rays),
       states_(states),
       settings_(settings),
       places_(choice.places()),
@@ -165,8 +167,13 @@ void TrialGrid::findShares() {
     });
 }
 
+size_t TrialGrid::HashOfKey::operator()(const Key& key) const {
+    uint32_t sum = 0;
+    for (const uint32_t k : key) sum = hash(sum, k);
+    return sum;
+}
+
 // Tetrahedra of earlier rounds keep what was found: by the sites that their probes are, and the corners.
-using Key = std::array<uint32_t, 4>;
 TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
     const auto name = [&](uint32_t position) {
         return position < probes_.places.size()
@@ -179,17 +186,20 @@ TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
 void TrialGrid::findVisibility() {
     GlobalGrid& grid = result_.placement.grid;
     grid.visibility.resize(grid.tetrahedra.size());
-    std::vector<uint32_t> fresh;
+    std::vector<uint32_t> fresh, number(grid.tetrahedra.size(), no_index);
     for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) {
         const auto found = seen_.find(keyOf(grid.tetrahedra[t]));
-        if (found != seen_.end())
+        if (found != seen_.end()) {
             grid.visibility[t] = found->second;
-        else
+        } else {
+            number[t] = static_cast<uint32_t>(fresh.size());
             fresh.push_back(t);
+        }
     }
-    std::vector<std::vector<std::array<float, 4>>> inside(grid.tetrahedra.size());
+    std::vector<std::vector<std::array<float, 4>>> inside(fresh.size());
     for (size_t i = 0; i < first_corner_; ++i)
-        if (!is_probe_[i]) inside[result_.at[i].tetrahedron].push_back(result_.at[i].barycentric);
+        if (const uint32_t n = number[result_.at[i].tetrahedron]; n != no_index && !is_probe_[i])
+            inside[n].push_back(result_.at[i].barycentric);
     tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
         const Tetrahedron& t = grid.tetrahedra[fresh[i]];
         std::array<glm::vec3, 4> corners;
@@ -198,7 +208,7 @@ void TrialGrid::findVisibility() {
             corners[k] = vec(grid.positions[t.probes[k]]);
             free[k] = isFree(t.probes[k]);
         }
-        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[fresh[i]]);
+        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[i], &cells_);
     });
     for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
 }

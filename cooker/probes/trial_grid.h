@@ -3,8 +3,9 @@
 
 #include <probes/placement.h>
 #include <probes/tetrahedron_walk.h>
+#include <trace/triangle_cells.h>
 
-#include <map>
+#include <unordered_map>
 
 namespace dimmer::cook {
 
@@ -55,6 +56,7 @@ class TrialGrid {
     std::vector<std::pair<uint32_t, uint32_t>> edges() const;
 
     const RayScene& rays_;
+    const TriangleCells cells_;
     std::span<const FitValue> states_;  // per place
     const GridSettings& settings_;
     std::vector<glm::vec3> places_;  // and behind them the free corners of the box
@@ -62,7 +64,10 @@ class TrialGrid {
     std::vector<uint32_t> corners_;  // per corner: its place, or no_index
     float floor_lux_ = 0;
     std::vector<float> importance_;  // per place
-    std::map<Key, TetrahedronVisibility> seen_;
+    struct HashOfKey {
+        size_t operator()(const Key& key) const;
+    };
+    std::unordered_map<Key, TetrahedronVisibility, HashOfKey> seen_;
     ChosenProbes probes_;
     std::vector<bool> is_probe_;  // per place but corners
     Result result_;

@@ -1,6 +1,7 @@
 #include <probes/visibility.h>
 
 #include <bake/sampling.h>
+#include <probes/obstacles.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,13 +16,14 @@ constexpr size_t places_max = 32;
 // nearer to the probe has less, and hides what no point happened to stand at.
 constexpr uint32_t draw_scale = 1024;
 constexpr uint32_t tries_per_sample = 3;
+constexpr float off_surface_share = 0.02f;  // of the way to a probe
 constexpr float same_plane_m = 1e-4f;
 constexpr uint32_t leak_cost = 3, miss_cost = 1;
 constexpr uint32_t lonely_miss_cost = 8;  // of a point that no other probe is taken to see
 constexpr std::array<int8_t, 4> seen_everywhere = {127, 127, 127, 127};
 constexpr std::array<int8_t, 4> seen_nowhere = {-127, -127, -127, -127};
 
-using Weights = std::array<float, 4>;  // barycentric
+using Weights = Barycentric;
 
 // Evenly over the tetrahedron: the unit cube folded onto it (Rocchini and Cignoni 2000).
 Weights pointInside(glm::vec3 u) {
@@ -32,10 +34,6 @@ Weights pointInside(glm::vec3 u) {
         u = {1 - u.y - u.z, u.y, u.x + u.y + u.z - 1};
     return {1 - u.x - u.y - u.z, u.x, u.y, u.z};
 }
-
-struct Plane {
-    glm::vec3 point, normal;
-};
 
 float value(const Weights& field, const Weights& at) {
     return field[0] * at[0] + field[1] * at[1] + field[2] * at[2] + field[3] * at[3];
@@ -77,10 +75,9 @@ std::array<Weights, corner_samples> pointsAtCorners() {
 
 class Table {
    public:
-    Table(const RayScene& rays, const std::array<glm::vec3, 4>& corners, const std::array<bool, 4>& free,
-          std::span<const std::array<float, 4>> places)
-        : rays_(rays), corners_(corners) {
-        for (size_t v = 0; v < 4; ++v) free_[v] = free[v];
+    Table(const RayScene& rays, const Obstacles& obstacles, const std::array<bool, 4>& free,
+          std::span<const Weights> places)
+        : rays_(rays), obstacles_(obstacles), free_(free) {
         for (const Weights& w : pointsAtCorners()) look(w);
         for (uint32_t i = 0; i < tries_per_sample * samples && points_.size() < corner_samples + samples; ++i)
             look(pointInside(sequence3d(i, 1)));
@@ -108,32 +105,47 @@ class Table {
 
     // From the point to the probes. Where none is seen, but backs are, the point lies in geometry or outside of the
     // level, and nobody will ask for it.
-    void look(const Weights& w) {
+    void look(const Weights& w, bool surfaces = true) {
         Point point{w};
-        const glm::vec3 from = w[0] * corners_[0] + w[1] * corners_[1] + w[2] * corners_[2] + w[3] * corners_[3];
         uint32_t hidden = 0, backs = 0;
+        const auto found = obstacles_.from(w, free_);
         for (size_t v = 0; v < 4; ++v) {
             if (!free_[v]) continue;
-            const float distance = glm::distance(from, corners_[v]);
-            point.seen[v] = true;
-            if (!(distance > 0)) continue;
-            const auto hit = rays_.nearest(from, (corners_[v] - from) / distance, distance, v);
-            if (!hit) continue;
-            point.seen[v] = false;
+            point.seen[v] = !found[v].any;
+            if (point.seen[v]) continue;
             ++hidden;
-            backs += hit->back && !rays_.scene().materials[rays_.triangles()[hit->triangle].material].double_sided;
-            point.plane[v] = numberOf(hit->triangle, rays_.pointOn(hit->triangle, hit->u, hit->v));
-            if (const auto near = rays_.nearest(corners_[v], (from - corners_[v]) / distance, distance, v))
-                numberOf(near->triangle, rays_.pointOn(near->triangle, near->u, near->v));
+            const auto& first = rays_.triangles()[found[v].first];
+            backs += found[v].back && !rays_.scene().materials[first.material].double_sided;
+            point.plane[v] = numberOf(found[v].first);
+            if (found[v].last != found[v].first) numberOf(found[v].last);
         }
         const bool open = 2 * backs <= hidden || point.seen != std::array<bool, 4>{};
         (open ? points_ : buried_).push_back(point);
+        if (!open && surfaces) lookAtSurface(w, found);
+    }
+
+    // From where ways to the probes come out of geometry: what is open of a tetrahedron that lies below the floor for
+    // the most part is a thin slice.
+    void lookAtSurface(const Weights& w, const std::array<Obstacle, 4>& found) {
+        for (size_t v = 0; v < 4; ++v) {
+            if (!found[v].any || !found[v].back) continue;
+            const float share = found[v].share + off_surface_share;
+            if (share >= 1) continue;
+            Weights out;
+            for (size_t k = 0; k < 4; ++k) out[k] = (1 - share) * w[k] + (k == v ? share : 0);
+            look(out, false);
+        }
     }
 
     // 1 and up, of planes_.
-    uint32_t numberOf(uint32_t triangle, glm::vec3 on) {
-        const Plane plane{on, rays_.triangles()[triangle].normal};
-        const Weights field = fieldOf(plane);
+    uint32_t numberOf(uint32_t triangle) {
+        const auto known = std::ranges::find(numbers_, triangle, &std::pair<uint32_t, uint32_t>::first);
+        if (known != numbers_.end()) return known->second;
+        numbers_.emplace_back(triangle, findNumber(triangle));
+        return numbers_.back().second;
+    }
+    uint32_t findNumber(uint32_t triangle) {
+        const Weights field = obstacles_.field(triangle);
         const auto same = [&](const Weights& other) {
             for (size_t k = 0; k < 4; ++k)
                 if (std::abs(other[k] - field[k]) > same_plane_m) return false;
@@ -143,13 +155,6 @@ class Table {
             if (same(planes_[i])) return i + 1;
         planes_.push_back(field);
         return static_cast<uint32_t>(planes_.size());
-    }
-
-    // Signed distances of the corners.
-    Weights fieldOf(const Plane& plane) const {
-        Weights out;
-        for (size_t i = 0; i < 4; ++i) out[i] = glm::dot(plane.normal, corners_[i] - plane.point);
-        return out;
     }
 
     // Points that no probe sees belong to those that stand on their side of most of what hides them from others: the
@@ -179,22 +184,24 @@ class Table {
             }
     }
 
-    uint32_t cost(size_t v, const std::array<int8_t, 4>& row) const {
+    // Some number above `most` where it is more than that.
+    uint32_t cost(size_t v, const std::array<int8_t, 4>& row, uint32_t most) const {
         uint32_t sum = 0;
         for (const Point& point : points_) {
             const bool taken_for_seen = value(row, point.at) > 0;
-            if (taken_for_seen != point.seen[v]) sum += taken_for_seen ? leak_cost : point.miss[v];
+            if (taken_for_seen == point.seen[v]) continue;
+            sum += draw_scale * (taken_for_seen ? leak_cost : point.miss[v]);
+            if (sum > most) return sum;
         }
-        sum *= draw_scale;
         for (const Point& point : buried_) sum += value(row, point.at) > 0;
         return sum;
     }
 
     std::array<int8_t, 4> bestRow(size_t v) const {
         std::array<int8_t, 4> best = seen_everywhere;
-        uint32_t least = cost(v, best);
+        uint32_t least = cost(v, best, UINT32_MAX);
         const auto consider = [&](const std::array<int8_t, 4>& row) {
-            const uint32_t c = cost(v, row);
+            const uint32_t c = cost(v, row, least);
             if (c < least) least = c, best = row;
         };
         if (least == 0) return best;
@@ -219,18 +226,24 @@ class Table {
     }
 
     const RayScene& rays_;
-    const std::array<glm::vec3, 4>& corners_;
-    std::array<bool, 4> free_;
+    const Obstacles& obstacles_;
+    const std::array<bool, 4> free_;
     std::vector<Point> points_, buried_;
-    std::vector<Weights> planes_;  // that stopped rays
+    std::vector<Weights> planes_;                         // that stopped rays
+    std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane
     std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;
 };
 
 }  // namespace
 
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
-                                     const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places) {
-    return Table(rays, corners, free, places).find();
+                                     const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places,
+                                     const TriangleCells* cells) {
+    const Obstacles obstacles(rays, cells, corners);
+    if (!obstacles.none()) return Table(rays, obstacles, free, places).find();
+    TetrahedronVisibility out;
+    for (size_t v = 0; v < 4; ++v) out.seen[v] = free[v] ? seen_everywhere : seen_nowhere;
+    return out;
 }
 
 }  // namespace dimmer::cook

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <pack/grid_data.h>
-#include <trace/ray_scene.h>
+#include <trace/triangle_cells.h>
 
 #include <array>
 #include <cstdint>
@@ -16,9 +16,9 @@ namespace dimmer::cook {
 // level do not count. A hidden point taken for seen counts more than the other way round, as light through a wall shows
 // more than one probe less, but a point that one probe alone sees is not left to none, and one that none sees belongs
 // to those on its side of what hides it. Doors' leaves stop rays where they stand closed. `free`: probes that do not
-// stand in the open see nothing.
+// stand in the open see nothing. `cells`: of the same level, for speed; null: rays alone are asked.
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
-                                     const std::array<bool, 4>& free,
-                                     std::span<const std::array<float, 4>> places = {});
+                                     const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places = {},
+                                     const TriangleCells* cells = nullptr);
 
 }  // namespace dimmer::cook

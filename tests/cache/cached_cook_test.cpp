@@ -205,6 +205,23 @@ TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
     EXPECT_EQ(made(level), stages);
 }
 
+// What rays meet is the same wherever a lamp stands.
+TEST_F(CachedCook, RaysOfEarlierCooksAreNotTracedAgain) {
+    LevelFile level = houseWithGrid();
+    run(level, true);
+    const auto raysWithLampAt = [&](double x) {
+        for (json& node : level.document["nodes"])
+            if (node.value("name", "") == "lamp3") node["translation"][0] = x;
+        return run(level, true).stats.rays;
+    };
+    const uint64_t known = raysWithLampAt(8.7);
+    for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache"))
+        if (entry.path().filename().string().starts_with("rays-")) std::filesystem::remove(entry.path());
+    const uint64_t unknown = raysWithLampAt(8.6);
+    EXPECT_GT(known, 0u);
+    EXPECT_LT(3 * known, unknown);  // shadow rays, rays aimed at doors, and places around the lamp are new
+}
+
 TEST_F(CachedCook, APlayAreaMakesTheGridAlone) {
     LevelFile level = houseWithGrid();
     made(level);
@@ -223,7 +240,7 @@ TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
         file.put('!').put('?');
         ++damaged;
     }
-    EXPECT_EQ(damaged, 7u);
+    EXPECT_EQ(damaged, 9u);
     SilentProgress silent;
     const CookResult result = run(level, true);
     for (const CacheLine& line : result.stats.cache) {

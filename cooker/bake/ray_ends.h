@@ -1,0 +1,66 @@
+// Where rays ended, for going there again: what a ray hits does not depend on which light is asked about.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+// The end of one ray: the receiver that it reads, or one of these.
+struct RayEnd {
+    static constexpr uint32_t unknown = UINT32_MAX;      // not traced yet
+    static constexpr uint32_t again = UINT32_MAX - 1;    // it met a leaf or an emitter: to be traced each time
+    static constexpr uint32_t sky = UINT32_MAX - 2;      // it met nothing
+    static constexpr uint32_t nothing = UINT32_MAX - 3;  // it met what sends no light back
+    static constexpr uint32_t kinds = 3;                 // of known ends that are no receivers
+};
+
+// The ends of the first rays of each of many rows (receivers, or places), in as many bits as their numbers need.
+class RayEnds {
+   public:
+    RayEnds() = default;
+    // `receivers`: that rays may read.
+    RayEnds(size_t rows, uint32_t receivers);
+
+    // 0: nothing is remembered.
+    size_t rows() const { return rows_; }
+    // Replaces `out`. Thread-safe.
+    void get(size_t row, std::vector<uint32_t>& out) const;
+    // Those of a block of rows (sparse_light.h) at once, none of them unknown; other blocks may be put at the same
+    // time.
+    void putBlock(size_t block, std::span<const std::vector<uint32_t>> rows);
+
+    std::vector<std::byte> toBytes() const;
+    // Nothing where they are not ends of so many rows.
+    static std::optional<RayEnds> fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers);
+
+   private:
+    struct Block {
+        std::vector<uint32_t> first;  // per row and one more, in ends
+        std::vector<uint32_t> words;
+    };
+    uint32_t code(uint32_t end) const { return end < receivers_ ? end : receivers_ + (RayEnd::again - end); }
+    // What is none of them is traced again.
+    uint32_t end(uint32_t code) const {
+        if (code < receivers_) return code;
+        return code - receivers_ < RayEnd::kinds ? RayEnd::again - (code - receivers_) : RayEnd::again;
+    }
+
+    size_t rows_ = 0;
+    uint32_t receivers_ = 0, bits_ = 0;
+    std::vector<Block> blocks_;
+};
+
+// Of one level, for each of its receivers; filled in where they are empty.
+struct RememberedRays {
+    RayEnds links;   // of the series
+    RayEnds gather;  // of the final gather, the first `kept_rays_max` of each receiver
+};
+
+// At some 18 bits each 2 kB a receiver, where single terms need so many; `preview` ends at 512.
+inline constexpr uint32_t kept_rays_max = 1024;
+
+}  // namespace dimmer::cook
