@@ -79,7 +79,8 @@ class Table {
           std::span<const Weights> places)
         : rays_(rays), obstacles_(obstacles), free_(free) {
         for (const Weights& w : pointsAtCorners()) look(w);
-        for (uint32_t i = 0; i < tries_per_sample * samples && points_.size() < corner_samples + samples; ++i)
+        for (uint32_t i = 0; i < tries_per_sample * samples && points_.size() - at_surfaces_ < corner_samples + samples;
+             ++i)
             look(pointInside(sequence3d(i, 1)));
         const size_t step = places.size() / places_max + 1;
         for (size_t i = 0; i < places.size(); i += step) look(places[i]);
@@ -133,7 +134,9 @@ class Table {
             if (share >= 1) continue;
             Weights out;
             for (size_t k = 0; k < 4; ++k) out[k] = (1 - share) * w[k] + (k == v ? share : 0);
+            const size_t before = points_.size();
             look(out, false);
+            at_surfaces_ += points_.size() - before;
         }
     }
 
@@ -229,6 +232,7 @@ class Table {
     const Obstacles& obstacles_;
     const std::array<bool, 4> free_;
     std::vector<Point> points_, buried_;
+    size_t at_surfaces_ = 0;                              // of points_
     std::vector<Weights> planes_;                         // that stopped rays
     std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane
     std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;
