@@ -110,9 +110,8 @@ TEST_F(Outputs, NumbersAndNamesThatMeanNothing) {
         EXPECT_THAT(result.err, AllOf(HasSubstr(option), HasSubstr("finite"), Not(HasSubstr("frames"))));
     };
     expectRefused({"stress", pack(), "--cpu", "--frames", "5", "--minutes", "nan"}, "--minutes");
-    for (const char* number : {"nan", "inf"})
-        expectRefused({"verify", level(), pack(), "--points", "1", "--paths", "2", "--max-error", number},
-                      "--max-error");
+    expectRefused({"verify", file("level.gltf"), pack(), "--points", "1", "--paths", "2", "--max-error", "nan"},
+                  "--max-error");
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ TEST_F(Streams, ExitCodesStayWithoutStderr) {
         const auto sampled = redirected({"sample", pack(), "--points", far}, redirection);
         EXPECT_EQ(sampled.exit_code, 0) << redirection;
         EXPECT_THAT(sampled.out, HasSubstr("nan"));
-        EXPECT_EQ(redirected({"verify", file("level.gltf"), pack(), "--points", "20", "--paths", "16", "--no-sets",
+        EXPECT_EQ(redirected({"verify", file("level.gltf"), pack(), "--points", "50", "--paths", "2048", "--no-sets",
                               "--max-error", "0"},
                              redirection)
                       .exit_code,
@@ -75,7 +75,7 @@ TEST_F(Streams, OutputThatIsLostIsSaid) {
 
 // What --help of cook promises: stderr is lines of JSON and lines behind "dimmer: ", be it over budget or misused.
 TEST_F(Streams, EveryLineOfAMessageIsMarked) {
-    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 300000}})");
+    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
     auto arguments = cookTo("no.dimmer", "tight.json");
     arguments.insert(arguments.end(), {"--progress", "json"});
     const auto over = runDimmer(arguments);
