@@ -11,8 +11,9 @@ using testing::IsEmpty;
 class Streams : public ToolTest {
    protected:
     // Through a shell, which redirects: "2>&-" closes stderr.
-    static ProcessResult redirected(const std::vector<std::string>& arguments, const std::string& redirection) {
-        std::vector<std::string> words = {"-c", "exec \"$0\" \"$@\" " + redirection, DIMMER_TOOL};
+    static ProcessResult redirected(const std::vector<std::string>& arguments, const std::string& redirection,
+                                    const std::string& tool = DIMMER_TOOL) {
+        std::vector<std::string> words = {"-c", "exec \"$0\" \"$@\" " + redirection, tool};
         words.insert(words.end(), arguments.begin(), arguments.end());
         return runProcess("/bin/sh", words);
     }
@@ -45,6 +46,7 @@ TEST_F(Streams, ExitCodesStayWithoutStderr) {
         EXPECT_EQ(redirected({"inspect", "--nonsense"}, redirection).exit_code, 2) << redirection;
         EXPECT_EQ(redirected({"cokk"}, redirection).exit_code, 2) << redirection;
         EXPECT_EQ(redirected({"--help"}, redirection).exit_code, 0) << redirection;
+        EXPECT_EQ(redirected({pack()}, redirection, DIMMER_SAMPLE_TOOL).exit_code, 2) << redirection;
         // A note about the point goes to stderr.
         const auto sampled = redirected({"sample", pack(), "--points", far}, redirection);
         EXPECT_EQ(sampled.exit_code, 0) << redirection;
