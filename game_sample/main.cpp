@@ -6,6 +6,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <sstream>
@@ -43,8 +44,13 @@ void declare(CLI::App& app, Arguments& arguments) {
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
 }
 
+// To stderr; lost where that is closed or full (fmt::print() would throw).
+void say(const std::string& message) {
+    std::fputs((message + "\n").c_str(), stderr);
+}
+
 int report(const Error& error) {
-    fmt::print(stderr, "dimmer-sample: {}\n", error.message);
+    say("dimmer-sample: " + error.message);
     switch (error.code) {
         case ErrorCode::InvalidArgument:
         case ErrorCode::NotFound:
@@ -105,8 +111,7 @@ Expected<Script> prepareScript(const Arguments& arguments, const Pack& pack) {
 
 int run(const Arguments& arguments) {
     if (!arguments.headless) {
-        fmt::print(stderr,
-                   "dimmer-sample: there is no window yet; add --headless to write pictures to the folder --out.\n");
+        say("dimmer-sample: there is no window yet; add --headless to write pictures to the folder --out.");
         return exit_bad_input;
     }
     const auto pack = Pack::open(arguments.pack);
@@ -117,9 +122,11 @@ int run(const Arguments& arguments) {
         *pack, *script, {arguments.pack, arguments.out, arguments.validate, !arguments.no_self_visibility});
     if (!played) return report(played.error());
 
-    fmt::print("{}", played->cost.table(played->device, played->driver));
-    for (const std::string& message : played->validation_messages) fmt::print(stderr, "validation: {}\n", message);
-    return played->validation_messages.empty() ? exit_done : exit_fault;
+    const std::string table = played->cost.table(played->device, played->driver);
+    const bool printed = std::fputs(table.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+    for (const std::string& message : played->validation_messages) say("validation: " + message);
+    if (!played->validation_messages.empty()) return exit_fault;
+    return printed ? exit_done : report({ErrorCode::Io, "the output could not be written"});
 }
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdio>
+#include <string>
 
 namespace dimmer::sample {
 
@@ -11,7 +13,7 @@ Progress::Progress(std::string what, uint32_t total)
     : what_(std::move(what)), total_(total), terminal_(isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() {
-    if (terminal_) fmt::print(stderr, "\n");
+    if (terminal_) std::fputs("\n", stderr);
 }
 
 void Progress::update(uint32_t done) {
@@ -24,8 +26,9 @@ void Progress::update(uint32_t done) {
     tenths_shown_ = tenths;
     const double spent_s = std::chrono::duration<double>(now - start_).count();
     const double left_s = spent_s * (total_ - done) / done;
-    fmt::print(stderr, "{}{} of {} {}, {:.0f} s left{}", terminal_ ? "\r\033[K" : "", done, total_, what_,
-               std::ceil(left_s), terminal_ ? "" : "\n");
+    const std::string line = fmt::format("{}{} of {} {}, {:.0f} s left{}", terminal_ ? "\r\033[K" : "", done, total_,
+                                         what_, std::ceil(left_s), terminal_ ? "" : "\n");
+    std::fputs(line.c_str(), stderr);  // where stderr is full the frames go on; fmt::print() would throw
 }
 
 }  // namespace dimmer::sample

@@ -5,15 +5,16 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gpu/copy_roof.h>
 #include <gpu/headless_device.h>
 #include <pack/pack_data.h>
 #include <probes/model_slots.h>
+#include <write/pack_writer.h>
 
 #include <algorithm>
 #include <array>
 #include <ctime>
-#include <fstream>
 #include <functional>
 #include <ostream>
 #include <thread>
@@ -122,10 +123,14 @@ Expected<CaseResult> measure(const BenchCase& one, LightState& state, const Upda
     return result;
 }
 
+bool isChosen(const BenchCase& one, const BenchOptions& options) {
+    return one.name.find(options.only) != std::string::npos;
+}
+
 Expected<void> measureAll(LightState& state, const Update& update, const Roof& roof, const BenchOptions& options,
                           std::string_view mode, std::vector<CaseResult>& results) {
     for (const BenchCase& one : casesOf(state.pack())) {
-        if (!options.only.empty() && one.name.find(options.only) == std::string::npos) continue;
+        if (!isChosen(one, options)) continue;
         auto result = measure(one, state, update, roof, options.frames, mode);
         if (!result) return std::unexpected(std::move(result.error()));
         results.push_back(std::move(*result));
@@ -198,12 +203,19 @@ Expected<void> measureModes(const Pack& pack, std::span<const Mode> chosen, cons
     return {};
 }
 
-Expected<void> writeFile(const std::filesystem::path& path, const std::string& text) {
-    std::ofstream file(path, std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) return fail(ErrorCode::Io, fmt::format("{}: the figures cannot be written there.", path.string()));
-    return {};
+// That there is something to measure.
+Expected<void> checkChoice(const Pack& pack, const BenchOptions& options) {
+    std::vector<std::string> names;
+    for (const BenchCase& one : casesOf(pack)) {
+        if (isChosen(one, options)) return {};
+        names.push_back(one.name);
+    }
+    return fail(ErrorCode::InvalidArgument, fmt::format("--only {}: no case's name contains that; there are: {}.",
+                                                        options.only, fmt::join(names, ", ")));
+}
+
+Expected<void> writeText(const std::filesystem::path& path, const std::string& text) {
+    return writeFileAtomically(path, std::as_bytes(std::span(text)));
 }
 
 }  // namespace
@@ -220,19 +232,20 @@ Expected<void> benchPack(const BenchOptions& options, std::ostream& out) {
 
     const auto pack = Pack::open(options.pack);
     if (!pack) return std::unexpected(pack.error());
+    if (auto ok = checkChoice(*pack, options); !ok) return ok;
     BenchReport report;
     if (auto ok = measureModes(*pack, chosen, options, report); !ok) return ok;
 
     const std::string json = reportJson(options, report);
     if (!options.plot.empty())
-        if (auto ok = writeFile(options.plot, plotSvg(report)); !ok) return ok;
+        if (auto ok = writeText(options.plot, plotSvg(report)); !ok) return ok;
     if (options.json == "-") {
         out << json;
         return {};
     }
     printTable(options, report, out);
     if (options.json.empty()) return {};
-    return writeFile(options.json, json);
+    return writeText(options.json, json);
 }
 
 }  // namespace dimmer::cook

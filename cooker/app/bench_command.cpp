@@ -1,5 +1,6 @@
 #include <app/bench.h>
 #include <app/command.h>
+#include <app/files.h>
 
 #include <fmt/format.h>
 
@@ -26,7 +27,8 @@ void addBenchCommand(CLI::App& app, int& exit_code) {
         options->command = fmt::format("dimmer bench {} --mode {} --frames {}", options->pack.string(), options->mode,
                                        options->frames);
         if (!options->only.empty()) options->command += fmt::format(" --only '{}'", options->only);
-        const auto done = benchPack(*options, std::cout);
+        auto done = checkFiles({{"PACK", options->pack}}, {{"--json", options->json}, {"--plot", options->plot}});
+        if (done) done = benchPack(*options, std::cout);
         exit_code = done ? exit_done : reportError(done.error());
     });
 }

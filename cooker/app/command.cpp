@@ -1,10 +1,12 @@
 #include <app/command.h>
 
+#include <app/say.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
 
-#include <cstdio>
+#include <cmath>
+#include <cstdlib>
 
 namespace dimmer::cook {
 
@@ -27,7 +29,7 @@ int exitCodeOf(ErrorCode code) {
 }
 
 int reportError(const Error& error) {
-    fmt::print(stderr, "dimmer: error: {}\n", error.message);
+    sayMessage("error: " + error.message);
     return exitCodeOf(error.code);
 }
 
@@ -38,6 +40,10 @@ Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& 
         return {};
     }
     return writeFileAtomically(file, std::as_bytes(std::span(text)));
+}
+
+std::string refuseNotFinite(const std::string& text) {
+    return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is no finite number";
 }
 
 std::string humanBytes(uint64_t bytes) {

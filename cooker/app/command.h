@@ -44,6 +44,9 @@ Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& 
 struct ReportInput;
 Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std::string& file);
 
+// For CLI::Option::check(): its own checks of ranges let "nan" pass.
+std::string refuseNotFinite(const std::string& text);
+
 std::string humanBytes(uint64_t bytes);
 
 }  // namespace dimmer::cook

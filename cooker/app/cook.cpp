@@ -1,5 +1,7 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <app/json_progress.h>
+#include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
@@ -10,6 +12,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace dimmer::cook {
@@ -115,13 +118,19 @@ Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
     return writeReport(*pack, input, a.report);
 }
 
+Expected<void> checkArguments(const CookArguments& a) {
+    std::vector<NamedFile> inputs = {{"LEVEL", a.options.level}};
+    const auto shipped = shippedProfiles();
+    if (std::ranges::find(shipped, a.options.profile) == shipped.end())
+        inputs.push_back({"--profile", a.options.profile});
+    if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" and "-" stand for a file here
+    return checkFiles(
+        inputs,
+        {{"--output", a.options.pack}, {"--json", a.json}, {"--write-level", a.write_level}, {"--report", a.report}});
+}
+
 int run(const CookArguments& a) {
-    if (auto ok = checkWritable(a.options.pack); !ok) return reportError(ok.error());
-    if (!a.json.empty() && a.json != "-")
-        if (auto ok = checkWritable(a.json); !ok) return reportError(ok.error());
-    for (const std::string& file : {a.write_level, a.report})
-        if (!file.empty())
-            if (auto ok = checkWritable(file); !ok) return reportError(ok.error());
+    if (auto ok = checkArguments(a); !ok) return reportError(ok.error());
     std::unique_ptr<Progress> progress;
     if (a.progress == "json")
         progress = std::make_unique<JsonProgress>();
@@ -140,7 +149,7 @@ int run(const CookArguments& a) {
             return reportError(ok.error());
     if (!a.report.empty())
         if (auto ok = writeReport(*result, a); !ok) return reportError(ok.error());
-    for (const std::string& w : result->stats.warnings) fmt::print(stderr, "dimmer: warning: {}\n", w);
+    for (const std::string& w : result->stats.warnings) sayMessage("warning: " + w);
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printTable(*result, costOf(result->pack));
@@ -185,7 +194,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
     c->add_option("--progress", a->progress,
                   "text, or json: lines with stage, done, total and seconds_left (of the stage) on stderr, among "
-                  "messages that begin with \"dimmer: \"")
+                  "messages, of which every line begins with \"dimmer: \"")
         ->check(CLI::IsMember({"text", "json"}))
         ->capture_default_str();
     c->add_option("--report", a->report,

@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <pipeline/contribution_text.h>
 #include <pipeline/explain.h>
 #include <pipeline/sample_points.h>
@@ -122,6 +123,7 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
 }
 
 int run(const ExplainArguments& a) {
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     const auto finite = [](float v) { return std::isfinite(v); };

@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <format/layout.h>
 #include <pack/pack_data.h>
 #include <pipeline/budget.h>
@@ -203,6 +204,7 @@ void printSettings(const PackData& d) {
 }
 
 int run(const InspectArguments& a) {
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     std::error_code ignored;

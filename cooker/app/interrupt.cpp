@@ -1,11 +1,10 @@
 #include <app/interrupt.h>
+#include <app/say.h>
 #include <write/pack_writer.h>
 
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdio>
 #include <thread>
 
 namespace dimmer::cook {
@@ -27,7 +26,8 @@ void endCleanlyOnInterrupt() {
         if (sigwait(&signals, &signal) != 0) return;
         fileReplacement().lock();
         // A terminal's cursor stands behind the progress bar.
-        fmt::print(stderr, "{}dimmer: interrupted\n", isatty(STDERR_FILENO) == 1 ? "\r\x1b[K" : "");
+        if (isatty(STDERR_FILENO) == 1) say("\r\x1b[K");
+        sayMessage("interrupted");
         _exit(128 + signal);
     }).detach();
 }

@@ -1,11 +1,10 @@
 #include <app/json_progress.h>
+#include <app/say.h>
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 namespace dimmer::cook {
 namespace {
@@ -43,8 +42,7 @@ void JsonProgress::print(uint64_t done) {
     nlohmann::ordered_json line = {{"stage", name_}, {"done", done}, {"total", total_}, {"seconds_left", nullptr}};
     // Thousandths are more than anyone knows.
     if (share >= 0.01) line["seconds_left"] = std::round(1000 * seconds * (1 - share) / share) / 1000;
-    fmt::print(stderr, "{}\n", line.dump());
-    std::fflush(stderr);
+    say(line.dump() + "\n");
 }
 
 }  // namespace dimmer::cook

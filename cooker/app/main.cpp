@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/interrupt.h>
+#include <app/say.h>
 #include <update/state_text.h>
 
 #include <fmt/format.h>
@@ -11,19 +12,21 @@
 
 namespace {
 
+using dimmer::cook::sayMessage;
+
 // Output that a full disk or a closed pipe swallowed is no output: the caller must not take it for done.
 int checkOutput(int exit_code) {
     using namespace dimmer::cook;
     const bool written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
     if (written || exit_code != exit_done) return exit_code;
-    fmt::print(stderr, "dimmer: error: the output could not be written\n");
+    sayMessage("error: the output could not be written");
     return exit_bad_input;
 }
 
 // A first word that is no command gets a better answer than CLI11's.
 bool isCommand(const CLI::App& app, int argc, char** argv) {
     if (argc < 2) {
-        fmt::print(stderr, "dimmer: error: a command is missing; `dimmer --help` lists them\n");
+        sayMessage("error: a command is missing; `dimmer --help` lists them");
         return false;
     }
     const std::string_view word = argv[1];
@@ -31,15 +34,25 @@ bool isCommand(const CLI::App& app, int argc, char** argv) {
     for (const CLI::App* command : app.get_subcommands({})) commands.push_back(command->get_name());
     if (word.starts_with('-') || std::ranges::find(commands, word) != commands.end()) return true;
     const std::string_view nearest = dimmer::nearestName(word, {commands.begin(), commands.end()});
-    fmt::print(stderr, "dimmer: error: there is no command '{}'; {}\n", word,
-               nearest.empty() ? "`dimmer --help` lists them" : fmt::format("did you mean '{}'?", nearest));
+    sayMessage(
+        fmt::format("error: there is no command '{}'; {}", word,
+                    nearest.empty() ? "`dimmer --help` lists them" : fmt::format("did you mean '{}'?", nearest)));
     return false;
+}
+
+// Help is asked for by what CLI11 throws, too.
+int endOfParsing(const CLI::App& app, const CLI::ParseError& error) {
+    using namespace dimmer::cook;
+    if (error.get_exit_code() == 0) return checkOutput(app.exit(error));
+    sayMessage(fmt::format("error: {}\n`dimmer COMMAND --help` explains a command", error.what()));
+    return exit_bad_input;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
     using namespace dimmer::cook;
+    keepClosedStreamsClosed();
     CLI::App app{
         "Dimmer: baked global illumination that you can switch.\nCooks a glTF level into a pack, and looks into "
         "packs."};
@@ -47,6 +60,7 @@ int main(int argc, char** argv) {
     app.footer(
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 3 over budget, "
         "4 error above --max-error, 130 interrupted.\n"
+        "No command writes over a file that it reads; what it is to write is looked at before the work.\n"
         "`dimmer COMMAND --help` explains a command and gives an example.");
     int exit_code = exit_done;
     addCookCommand(app, exit_code);
@@ -65,13 +79,13 @@ int main(int argc, char** argv) {
         endCleanlyOnInterrupt();
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
-        return app.exit(error) == 0 ? exit_done : exit_bad_input;
+        return endOfParsing(app, error);
     } catch (const std::bad_alloc&) {
-        fmt::print(stderr, "dimmer: error: out of memory\n");
+        sayMessage("error: out of memory");
         return exit_our_fault;
     } catch (const std::exception& error) {
         if (std::ferror(stdout)) return checkOutput(exit_done);  // fmt throws about the stream that it prints to
-        fmt::print(stderr, "dimmer: internal error: {}\n", error.what());
+        sayMessage(fmt::format("internal error: {}", error.what()));
         return exit_our_fault;
     }
     return checkOutput(exit_code);

@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <app/terminal_progress.h>
 #include <pipeline/reference_state.h>
 #include <pipeline/sample_points.h>
@@ -32,6 +33,8 @@ Expected<void> writeValues(const std::string& file, std::span<const QueryPoint> 
 }
 
 int run(const ReferenceArguments& a) {
+    if (auto ok = checkFiles({{"LEVEL", a.level}, {"--points", a.points}}, {{"--output", a.output}}); !ok)
+        return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto state = readReferenceState(*scene, a.state);

@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <report/report.h>
 #include <write/pack_writer.h>
 
@@ -36,7 +37,34 @@ Expected<void> addCook(const std::string& file, ReportInput& input) {
     return {};
 }
 
+// Whether all that the report shows of `verify --json` is there.
+bool isVerifyReport(const nlohmann::json& json) {
+    // A figure that is no number, such as an error of no points, is written as null.
+    const auto isFigure = [](const nlohmann::json& v) { return v.is_number() || v.is_null(); };
+    try {
+        for (const char* where : {"surface", "tilted"})
+            for (const char* figure : {"mean", "p95", "bias"})
+                if (!isFigure(json.at(where).at(figure))) return false;
+        for (const nlohmann::json& set : json.at("sets"))
+            if (!set.at("name").is_string()) return false;
+        return json.at("state").is_string() && json.at("converged").is_boolean() && json.at("sets").is_array();
+    } catch (const nlohmann::json::exception&) {
+        return false;
+    }
+}
+
+Expected<void> addVerify(const std::string& file, ReportInput& input) {
+    auto json = readJson(file);
+    if (!json) return std::unexpected(json.error());
+    if (!isVerifyReport(*json))
+        return fail(ErrorCode::BadInput, fmt::format("{}: it is not what `dimmer verify --json` writes", file));
+    input.verify = std::move(*json);
+    return {};
+}
+
 int run(const ReportArguments& a) {
+    const std::vector<NamedFile> inputs = {{"PACK", a.pack}, {"--cook", a.cook_json}, {"--verify", a.verify_json}};
+    if (auto ok = checkFiles(inputs, {{"--output", a.output}}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     ReportInput input;
@@ -45,11 +73,8 @@ int run(const ReportArguments& a) {
     input.file_bytes = std::filesystem::file_size(a.pack, ignored);
     if (!a.cook_json.empty())
         if (auto ok = addCook(a.cook_json, input); !ok) return reportError(ok.error());
-    if (!a.verify_json.empty()) {
-        auto json = readJson(a.verify_json);
-        if (!json) return reportError(json.error());
-        input.verify = std::move(*json);
-    }
+    if (!a.verify_json.empty())
+        if (auto ok = addVerify(a.verify_json, input); !ok) return reportError(ok.error());
     input.heat_maps = a.heat_maps;
     if (auto ok = writeReport(*pack, input, a.output); !ok) return reportError(ok.error());
     return exit_done;

@@ -1,4 +1,6 @@
 #include <app/command.h>
+#include <app/files.h>
+#include <app/say.h>
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 #include <gpu/headless_device.h>
@@ -45,6 +47,8 @@ Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
 }
 
 int run(const SampleArguments& a) {
+    if (auto ok = checkFiles({{"PACK", a.pack}, {"--points", a.points}}, {{"--output", a.output}}); !ok)
+        return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     const auto points = readPoints(a.points);
@@ -59,8 +63,8 @@ int run(const SampleArguments& a) {
     size_t missed = 0;
     for (const auto& s : samples) missed += !s;
     if (missed > 0)
-        fmt::print(stderr, "dimmer: note: {} of {} points have no lightmapped surface within {:.0f} cm; they are nan\n",
-                   missed, samples.size(), 100.0 * static_cast<double>(surface_reach_m));
+        sayMessage(fmt::format("note: {} of {} points have no lightmapped surface within {:.0f} cm; they are nan",
+                               missed, samples.size(), 100.0 * static_cast<double>(surface_reach_m)));
     return exit_done;
 }
 

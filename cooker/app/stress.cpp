@@ -1,4 +1,6 @@
 #include <app/command.h>
+#include <app/files.h>
+#include <app/say.h>
 #include <app/terminal_progress.h>
 #include <stress/stress.h>
 
@@ -42,6 +44,7 @@ nlohmann::ordered_json toJson(const StressReport& r, const StressArguments& a, c
 }
 
 int run(StressArguments a) {
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     a.options.seconds_max = a.minutes * 60;
@@ -59,9 +62,10 @@ int run(StressArguments a) {
         if (auto ok = writeJson(toJson(*report, a, name), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printReport(*report, name);
     if (report->exact() && report->memoryFlat()) return exit_done;
-    fmt::print(stderr, "dimmer: {}; please report it with the pack and seed {}\n",
-               report->exact() ? "memory grew or shrank by more than 1 %" : "pages differ from a fresh blend",
-               a.options.seed);
+    sayMessage(
+        fmt::format("{}; please report it with the pack and seed {}",
+                    report->exact() ? "memory grew or shrank by more than 1 %" : "pages differ from a fresh blend",
+                    a.options.seed));
     return exit_our_fault;
 }
 
@@ -71,11 +75,12 @@ void addStressCommand(CLI::App& app, int& exit_code) {
     auto a = std::make_shared<StressArguments>();
     auto* c = app.add_subcommand("stress", "Play a random game on every runtime; pages must never drift");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
-    c->add_option("--frames", a->options.frames, "frames at most")
+    c->add_option("--frames", a->options.frames, "frames at most, the one before each comparison among them")
         ->check(CLI::Range(uint64_t{1}, uint64_t{1} << 40))
         ->capture_default_str();
     c->add_option("--minutes", a->minutes, "end after so long; 0: after all frames")
         ->check(CLI::Range(0.0, 1e6))
+        ->check(refuseNotFinite)
         ->capture_default_str();
     c->add_option("--check-every", a->options.check_every, "frames between two comparisons with a fresh blend")
         ->check(CLI::Range(1u, 1u << 30))

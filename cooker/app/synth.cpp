@@ -1,4 +1,5 @@
 #include <app/command.h>
+#include <app/files.h>
 #include <synth/synth.h>
 #include <write/pack_writer.h>
 
@@ -22,6 +23,7 @@ std::vector<std::string> levelNames() {
 }
 
 int run(SynthArguments& a) {
+    if (auto ok = checkFiles({}, {{"--output", a.output}}); !ok) return reportError(ok.error());
     a.options.level = *productionLevel(a.like);
     auto data = synthesise(a.options);
     if (!data) return reportError(data.error());

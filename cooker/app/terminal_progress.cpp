@@ -1,9 +1,10 @@
+#include <app/say.h>
 #include <app/terminal_progress.h>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include <cstdio>
+#include <algorithm>
 
 namespace dimmer::cook {
 namespace {
@@ -44,15 +45,14 @@ void TerminalProgress::draw() {
     const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
     const int filled = static_cast<int>(share * bar_width);
     const std::string left = share > 0.01 ? fmt::format("{:.0f} s left", seconds * (1 - share) / share) : "";
-    fmt::print(stderr, "\r\x1b[K{:<24} [{:#<{}}{:.<{}}] {:3.0f} % {}", name_, "", filled, "", bar_width - filled,
-               100 * share, left);
-    std::fflush(stderr);
+    say(fmt::format("\r\x1b[K{:<24} [{:#<{}}{:.<{}}] {:3.0f} % {}", name_, "", filled, "", bar_width - filled,
+                    100 * share, left));
 }
 
 void TerminalProgress::endStage() {
     if (name_.empty()) return;
     const double seconds = std::chrono::duration<double>(Clock::now() - started_).count();
-    fmt::print(stderr, "{}{:<24} {:.1f} s\n", terminal_ ? "\r\x1b[K" : "", name_, seconds);
+    say(fmt::format("{}{:<24} {:.1f} s\n", terminal_ ? "\r\x1b[K" : "", name_, seconds));
 }
 
 }  // namespace dimmer::cook

@@ -1,4 +1,6 @@
 #include <app/command.h>
+#include <app/files.h>
+#include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/heat_map.h>
 #include <pipeline/profile.h>
@@ -111,6 +113,10 @@ Expected<void> writeCsv(const VerifyReport& report, const std::string& file) {
 }
 
 int run(VerifyArguments a) {
+    const std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"PACK", a.pack}};
+    const NamedFile heatmap = {"--heatmap", a.heatmap, true};
+    if (auto ok = checkFiles(inputs, {{"--json", a.json}, {"--csv", a.csv}, heatmap}); !ok)
+        return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto pack = Pack::open(a.pack);
@@ -127,7 +133,7 @@ int run(VerifyArguments a) {
         if (auto ok = writeJson(toJson(*report, a.options), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printReport(*report, a.options);
     if (a.max_error < 0 || report->surface.mean <= a.max_error) return exit_done;
-    fmt::print(stderr, "dimmer: the mean error, {:.4f}, is above {}\n", report->surface.mean, a.max_error);
+    sayMessage(fmt::format("the mean error, {:.4f}, is above {}", report->surface.mean, a.max_error));
     return exit_above_max_error;
 }
 
@@ -155,7 +161,8 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
     c->add_flag("--formats", a->options.formats, "what each colour format and directional model would cost here");
     c->add_option("--max-error", a->max_error,
                   "exit with 4 when the mean error at surfaces is above, e.g. 0.1 for 10 %")
-        ->check(CLI::NonNegativeNumber);
+        ->check(CLI::NonNegativeNumber)
+        ->check(refuseNotFinite);
     c->add_option("--heatmap", a->heatmap,
                   "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
     c->add_option("--csv", a->csv,

@@ -10,12 +10,59 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cstdio>
+#include <fstream>
 #include <set>
 
 namespace dimmer::cook {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* index_name = "index.json";
+
+std::string pictureName(std::string_view layer, uint32_t page) {
+    return fmt::format("{}_page_{}.exr", layer, page);
+}
+
+std::string contributionName(uint32_t contribution) {
+    return fmt::format("contribution_{:03}", contribution);
+}
+
+Expected<void> removeFile(const std::filesystem::path& file) {
+    std::error_code problem;
+    std::filesystem::remove(file, problem);
+    if (!problem) return {};
+    return fail(ErrorCode::Io, fmt::format("{}: it cannot be removed: {}", file.string(), problem.message()));
+}
+
+// Files of an earlier export, as its index has them; anybody may have written that.
+std::vector<std::string> picturesOf(const Json& index) {
+    std::vector<std::string> names;
+    const auto add = [&](const Json& pictures) {
+        for (const Json& p : pictures)
+            if (p.is_object() && p.contains("file") && p["file"].is_string()) names.push_back(p["file"]);
+    };
+    if (!index.is_object()) return names;
+    if (index.contains("base")) add(index["base"]);
+    if (index.contains("contributions"))
+        for (const Json& c : index["contributions"])
+            if (c.is_object() && c.contains("pictures")) add(c["pictures"]);
+    std::erase_if(names, [](const std::string& name) { return !isExportedName(name); });
+    return names;
+}
+
+// The index first: without it the rest is no export.
+Expected<void> removeExport(const std::filesystem::path& folder) {
+    std::ifstream in(folder / index_name);
+    if (!in) return {};
+    const Json index = Json::parse(in, nullptr, false);
+    in.close();
+    if (auto ok = removeFile(folder / index_name); !ok) return ok;
+    for (const std::string& picture : picturesOf(index))
+        if (auto ok = removeFile(folder / picture); !ok) return ok;
+    return {};
+}
 
 // Records of one page, where they lie.
 struct Layer {
@@ -92,7 +139,7 @@ class Exporter {
             const ExrPicture picture = pictureOf(d_, layer);
             const auto bytes = exrBytes(picture);
             if (!bytes) return std::unexpected(bytes.error());
-            const std::string file = fmt::format("{}_page_{}.exr", name, page);
+            const std::string file = pictureName(name, page);
             if (auto ok = put(file, *bytes); !ok) return std::unexpected(ok.error());
             list.push_back({{"page", page},
                             {"file", file},
@@ -133,6 +180,15 @@ Json nodesOf(const PackData& d) {
 
 }  // namespace
 
+bool isExportedName(std::string_view name) {
+    const std::string text(name);
+    uint32_t contribution = 0, page = 0;
+    if (std::sscanf(text.c_str(), "base_page_%u", &page) == 1) return text == pictureName("base", page);
+    if (std::sscanf(text.c_str(), "contribution_%u_page_%u", &contribution, &page) == 2)
+        return text == pictureName(contributionName(contribution), page);
+    return text == index_name;
+}
+
 Expected<ExportStats> exportPack(const Pack& pack, const std::filesystem::path& folder, Progress& progress) {
     const PackData& d = pack.data();
     std::error_code problem;
@@ -140,6 +196,7 @@ Expected<ExportStats> exportPack(const Pack& pack, const std::filesystem::path& 
     if (problem)
         return fail(ErrorCode::Io,
                     fmt::format("{}: the folder cannot be made: {}", folder.string(), problem.message()));
+    if (auto ok = removeExport(folder); !ok) return std::unexpected(ok.error());
     progress.stage("export", d.contributions.size() + 1);
     Exporter exporter(d, folder);
     Json index;
@@ -155,7 +212,7 @@ Expected<ExportStats> exportPack(const Pack& pack, const std::filesystem::path& 
     index["contributions"] = Json::array();
     for (uint32_t k = 0; k < d.contributions.size(); ++k) {
         const Contribution& c = d.contributions[k];
-        auto pictures = exporter.write(fmt::format("contribution_{:03}", k), layersOf(d, k));
+        auto pictures = exporter.write(contributionName(k), layersOf(d, k));
         if (!pictures) return std::unexpected(pictures.error());
         index["contributions"].push_back({{"light", lightName(d, c)},
                                           {"always_on", !c.light_set.has_value()},
@@ -167,7 +224,7 @@ Expected<ExportStats> exportPack(const Pack& pack, const std::filesystem::path& 
     }
     index["nodes"] = nodesOf(d);
     const std::string text = index.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-    if (auto ok = exporter.put("index.json", std::as_bytes(std::span(text))); !ok) return std::unexpected(ok.error());
+    if (auto ok = exporter.put(index_name, std::as_bytes(std::span(text))); !ok) return std::unexpected(ok.error());
     progress.finish();
     return exporter.stats;
 }

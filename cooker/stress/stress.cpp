@@ -56,10 +56,13 @@ class StressRun {
 
     Expected<StressReport> run(Progress& progress) {
         const auto begin = std::chrono::steady_clock::now();
-        const uint64_t checks = std::max<uint64_t>(1, options_.frames / options_.check_every);
+        // Before each check comes one more frame, which settles.
+        const uint64_t frames = std::max<uint64_t>(1, options_.frames), per_check = uint64_t{options_.check_every} + 1;
+        const uint64_t checks = (frames + per_check - 1) / per_check;
         progress.stage("frames", checks);
         while (report_.checks < checks) {
-            for (uint32_t i = 0; i < options_.check_every; ++i)
+            const uint64_t changing = std::min(per_check, frames - report_.frames) - 1;
+            for (uint64_t i = 0; i < changing; ++i)
                 if (auto ok = frame(script_.next()); !ok) return std::unexpected(std::move(ok.error()));
             if (auto ok = frame(script_.settle()); !ok) return std::unexpected(std::move(ok.error()));
             if (auto ok = comeToRest(); !ok) return std::unexpected(std::move(ok.error()));

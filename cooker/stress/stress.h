@@ -11,9 +11,9 @@
 namespace dimmer::cook {
 
 struct StressOptions {
-    uint64_t frames = 1'000'000;
+    uint64_t frames = 1'000'000;  // at most, 1 or more; the one that settles before each check is among them
     double seconds_max = 600;     // ends sooner when this is over; 0: never
-    uint32_t check_every = 1000;  // frames
+    uint32_t check_every = 1000;  // frames, then one that settles
     uint32_t seed = 1;
 };
 

@@ -15,6 +15,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <string_view>
 
 namespace dimmer::cook {
 namespace {
@@ -301,9 +302,12 @@ bool giveUsualRights(int file) {
     return fchmod(file, 0666 & ~mask) == 0;
 }
 
+// What mkstemp makes random behind the name of a file that is replaced.
+constexpr std::string_view temporary_suffix = ".XXXXXX";
+
 Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes, Flush flush) {
     const std::scoped_lock lock(fileReplacement());
-    std::string temporary = path.string() + ".XXXXXX";
+    std::string temporary = path.string().append(temporary_suffix);
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
     const bool written = writeAll(file, bytes) && giveUsualRights(file) && (flush == Flush::No || fsync(file) == 0);
@@ -313,6 +317,38 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
     const auto failed = ioError(path, "cannot be written, nothing was changed", written ? errno : error);
     unlink(temporary.c_str());
     return failed;
+}
+
+bool isFolder(const std::filesystem::path& path) {
+    std::error_code ignored;
+    return std::filesystem::is_directory(path, ignored);
+}
+
+bool isSpecialFile(const std::filesystem::path& path) {
+    std::error_code ignored;
+    const auto status = std::filesystem::status(path, ignored);
+    return std::filesystem::exists(status) && !std::filesystem::is_regular_file(status) &&
+           !std::filesystem::is_directory(status);
+}
+
+// Whether replaceFile() has the rights and the room for the temporary's name.
+Expected<void> checkReplaceable(const std::filesystem::path& path) {
+    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+    std::error_code error;
+    if (std::filesystem::status(folder, error).type() == std::filesystem::file_type::none)
+        return ioError(path, "its folder cannot be looked at", error.value());
+    if (!isFolder(folder))
+        return fail(ErrorCode::Io, fmt::format("{}: there is no folder {}", path.string(), folder.string()));
+    // faccessat() asks for the user that creates files: access() would ask for the one behind a setuid.
+    if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0)
+        return ioError(path, "no file can be made in this folder", errno);
+    const auto tooLong = [&](size_t bytes, int limit) {
+        const long most = pathconf(folder.c_str(), limit);  // of paths: with the 0 at their end
+        return most > 0 && bytes + temporary_suffix.size() + (limit == _PC_PATH_MAX) > static_cast<size_t>(most);
+    };
+    if (tooLong(path.filename().native().size(), _PC_NAME_MAX) || tooLong(path.native().size(), _PC_PATH_MAX))
+        return ioError(path, "cannot be written", ENAMETOOLONG);
+    return {};
 }
 
 }  // namespace
@@ -326,28 +362,37 @@ std::mutex& fileReplacement() {
     return mutex;
 }
 
+Expected<std::filesystem::path> behindLinks(const std::filesystem::path& path) {
+    constexpr int links_max = 40;  // as many as Linux follows
+    std::filesystem::path file = path;
+    for (int links = 0; links <= links_max; ++links) {
+        std::error_code error;
+        if (!std::filesystem::is_symlink(std::filesystem::symlink_status(file, error))) return file;
+        const auto next = std::filesystem::read_symlink(file, error);
+        if (error) return ioError(path, "the link cannot be followed", error.value());
+        file = file.parent_path() / next;
+    }
+    return ioError(path, "the link cannot be followed", ELOOP);
+}
+
 Expected<void> checkWritable(const std::filesystem::path& path) {
-    std::error_code ignored;
     if (path.empty()) return fail(ErrorCode::InvalidArgument, "the name of the file to write is empty");
-    if (std::filesystem::is_directory(path, ignored)) return ioError(path, "cannot be written", EISDIR);
-    const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-    if (!std::filesystem::is_directory(folder, ignored))
-        return fail(ErrorCode::Io, fmt::format("{}: there is no folder {}", path.string(), folder.string()));
-    if (access(folder.c_str(), W_OK | X_OK) != 0 && !std::filesystem::exists(path, ignored))
-        return ioError(path, "no file can be made in this folder", errno);
-    return {};
+    if (isFolder(path)) return ioError(path, "cannot be written", EISDIR);
+    if (isSpecialFile(path)) {
+        if (faccessat(AT_FDCWD, path.c_str(), W_OK, AT_EACCESS) != 0) return ioError(path, "cannot be opened", errno);
+        return {};
+    }
+    const auto file = behindLinks(path);
+    if (!file) return std::unexpected(file.error());
+    return checkReplaceable(*file);
 }
 
 Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes, Flush flush) {
     if (auto ok = checkWritable(path); !ok) return ok;
-    std::error_code error;
-    const auto status = std::filesystem::status(path, error);
-    if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
-        return writeToSpecialFile(path, bytes);
+    if (isSpecialFile(path)) return writeToSpecialFile(path, bytes);
     // The file that a link stands for is what the user means to replace.
-    const auto target =
-        std::filesystem::is_symlink(path, error) ? std::filesystem::weakly_canonical(path, error) : path;
-    return replaceFile(error ? path : target, bytes, flush);
+    const auto file = behindLinks(path);
+    return file ? replaceFile(*file, bytes, flush) : std::unexpected(file.error());
 }
 
 }  // namespace dimmer::cook

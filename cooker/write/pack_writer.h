@@ -14,7 +14,10 @@ namespace dimmer::cook {
 // The same data and level give the same bytes. `zstd_level`: 1..19; what reads the pack need not know.
 std::vector<std::byte> packBytes(const PackData& data, int zstd_level = 12);
 
-// Whether a file of that name can be expected to be writable; asked before hours of work, not after.
+// The file that a link, or a link to a link, stands for, be it there or not; a path that is no link as it is.
+Expected<std::filesystem::path> behindLinks(const std::filesystem::path& path);
+
+// Whether writeFileAtomically() can be expected to work; asked before hours of work, not after.
 Expected<void> checkWritable(const std::filesystem::path& path);
 
 // Held while writeFileAtomically() has a temporary file: who ends the process from another thread takes it first.

@@ -71,6 +71,9 @@ TEST_F(ReportTool, WhatIsRefused) {
     refused({"--cook", file("broken.json")}, "no JSON");
     refused({"--cook", write("list.json", "[1]")}, "not what `dimmer cook --json` writes");
     refused({"--verify", file("broken.json")}, "no JSON");
+    for (const char* other : {"[1]", "{}", "null", R"({"state": "", "converged": true, "surface": 1, "sets": []})"})
+        refused({"--verify", write("other.json", other)}, "not what `dimmer verify --json` writes");
+    refused({"--verify", file("cook.json")}, "not what `dimmer verify --json` writes");
     refused({"--heatmap", file("nowhere")}, "page_0.png");
 }
 

@@ -135,5 +135,74 @@ TEST(WriteFile, LinksAreFollowed) {
     EXPECT_EQ(filesIn(folder.path), 2u);
 }
 
+TEST(WriteFile, LinksToWhatIsNotThereYetAreFollowed) {
+    const TemporaryFolder folder;
+    std::filesystem::create_directory(folder.path / "deep");
+    const auto first = folder.path / "first", second = folder.path / "deep/second";
+    std::filesystem::create_symlink("deep/second", first);
+    std::filesystem::create_symlink("../target", second);  // from where the link is
+    EXPECT_TRUE(checkWritable(first));
+    ASSERT_TRUE(write(first, "new"));
+    EXPECT_TRUE(std::filesystem::is_symlink(first));
+    EXPECT_TRUE(std::filesystem::is_symlink(second));
+    EXPECT_FALSE(std::filesystem::is_symlink(folder.path / "target"));
+    EXPECT_EQ(readText(folder.path / "target"), "new");
+    std::filesystem::create_symlink(folder.path / "absolute", folder.path / "link");
+    ASSERT_TRUE(write(folder.path / "link", "x"));
+    EXPECT_EQ(readText(folder.path / "absolute"), "x");
+}
+
+TEST(WriteFile, LinksThatLeadNowhereStay) {
+    const TemporaryFolder folder;
+    const auto lost = folder.path / "lost", loop = folder.path / "loop";
+    std::filesystem::create_symlink("none/target", lost);
+    std::filesystem::create_symlink("loop", loop);
+    expectIoError(checkWritable(lost), folder.path / "none", "there is no folder");
+    expectIoError(checkWritable(loop), loop, "Too many levels");
+    EXPECT_FALSE(write(lost, "x"));
+    EXPECT_FALSE(write(loop, "x"));
+    EXPECT_TRUE(std::filesystem::is_symlink(lost));
+    EXPECT_TRUE(std::filesystem::is_symlink(loop));
+    EXPECT_EQ(filesIn(folder.path), 2u);
+}
+
+TEST(WriteFile, NamesWithoutRoomForATemporaryAreKnownBefore) {
+    const TemporaryFolder folder;
+    // NAME_MAX is 255 on Linux's file systems; the temporary's name is 7 longer.
+    const auto longest = folder.path / std::string(248, 'n');
+    EXPECT_TRUE(checkWritable(longest));
+    EXPECT_TRUE(write(longest, "x"));
+    for (const size_t length : {249, 255, 256, 5000}) {
+        const auto path = folder.path / std::string(length, 'n');
+        expectIoError(checkWritable(path), path, "File name too long");
+    }
+    EXPECT_EQ(filesIn(folder.path), 1u);
+}
+
+// In a process of its own, which gives root's rights away: exit code 0 when the reason is that of rights.
+void expectNoRights(const std::filesystem::path& path) {
+    const auto asNobody = [&] {
+        if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(3);
+        const auto done = checkWritable(path);
+        if (done) _exit(1);
+        _exit(done.error().message.find("Permission denied") != std::string::npos ? 0 : 2);
+    };
+    EXPECT_EXIT(asNobody(), testing::ExitedWithCode(0), "") << path;
+}
+
+TEST(WriteFile, WhatRightsForbidIsKnownBeforeAndNamed) {
+    const TemporaryFolder folder;
+    ASSERT_TRUE(write(folder.path / "old", "x"));
+    using std::filesystem::perms;
+    std::filesystem::permissions(folder.path, perms::owner_read | perms::owner_exec | perms::others_read |
+                                                  perms::others_exec | perms::group_read | perms::group_exec);
+    expectNoRights(folder.path / "new");
+    expectNoRights(folder.path / "old");  // replaced by a new file beside it, not overwritten
+    std::filesystem::permissions(folder.path, perms::none);
+    expectNoRights(folder.path / "old");
+    expectNoRights(folder.path / "inner/new");
+    std::filesystem::permissions(folder.path, perms::owner_all);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

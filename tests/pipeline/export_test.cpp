@@ -199,6 +199,68 @@ TEST(Export, TheSamePackGivesTheSameBytes) {
         EXPECT_EQ(bytesOf(entry.path()), bytesOf(second.path / entry.path().filename())) << entry.path();
 }
 
+std::set<std::string> namesIn(const std::filesystem::path& folder) {
+    std::set<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder)) names.insert(entry.path().filename());
+    return names;
+}
+
+Pack exportPackOf(uint32_t sets) {
+    return *Pack::fromData(dimmer::test::randomPack(1, {.sets = sets, .doors = 0}));
+}
+
+TEST(Export, AnEarlierExportGoes) {
+    SilentProgress silent;
+    const Folder used, fresh;
+    ASSERT_TRUE(exportPack(exportPackOf(6), used.path, silent));
+    ASSERT_TRUE(exportPack(exportPackOf(2), fresh.path, silent));
+    ASSERT_GT(namesIn(used.path).size(), namesIn(fresh.path).size());
+    used.folder.write("light/notes.exr", "mine", 4);
+    ASSERT_TRUE(exportPack(exportPackOf(2), used.path, silent));
+    auto expected = namesIn(fresh.path);
+    expected.insert("notes.exr");
+    EXPECT_EQ(namesIn(used.path), expected);
+}
+
+TEST(Export, AnIndexMayNameOnlyPictures) {
+    SilentProgress silent;
+    const Folder out;
+    std::filesystem::create_directory(out.path);
+    out.folder.write("base_page_0.exr", "x", 1);  // outside the export's folder
+    for (const char* name : {"house.dimmer", "base_page_0.exr.bak", "base_page_00.exr", "contribution_7_page_0.exr"})
+        out.folder.write(std::string("light/") + name, "x", 1);
+    const auto before = namesIn(out.path);
+    const json pictures = {{{"file", "../base_page_0.exr"}},
+                           {{"file", "house.dimmer"}},
+                           {{"file", 3}},
+                           {{"file", "base_page_0.exr.bak"}},
+                           "base_page_00.exr",
+                           {{"file", "base_page_00.exr"}},
+                           {{"file", "contribution_7_page_0.exr"}},
+                           {{"file", ""}},
+                           {{"file", "."}}};
+    const std::string index = json({{"base", pictures}, {"contributions", {{{"pictures", pictures}}, 1, "x"}}}).dump();
+    for (const std::string& text : {index, std::string("{"), std::string("[]"), std::string(R"({"base": 1})")}) {
+        out.folder.write("light/index.json", text.data(), text.size());
+        ASSERT_TRUE(exportPack(exportPackOf(2), out.path, silent)) << text;
+        const auto after = namesIn(out.path);
+        for (const std::string& name : before) EXPECT_TRUE(after.contains(name)) << name;
+    }
+    EXPECT_TRUE(std::filesystem::exists(out.folder.path / "base_page_0.exr"));
+    EXPECT_EQ(out.index()["version"], 1);
+}
+
+// What stops half way is no export: nothing says which of its pictures belong together.
+TEST(Export, AnUnfinishedOneHasNoIndex) {
+    SilentProgress silent;
+    const Folder out;
+    ASSERT_TRUE(exportPack(exportPackOf(2), out.path, silent));
+    std::filesystem::remove(out.path / "base_page_0.exr");
+    std::filesystem::create_directories(out.path / "base_page_0.exr/in the way");
+    EXPECT_FALSE(exportPack(exportPackOf(2), out.path, silent));
+    EXPECT_FALSE(std::filesystem::exists(out.path / "index.json"));
+}
+
 TEST(Export, AFolderThatCannotBeMade) {
     const auto pack = Pack::fromData(dimmer::test::samplePack());
     const test::TemporaryFolder folder;

@@ -35,6 +35,22 @@ TEST(Stress, CpuRuntimesNeverDrift) {
     expectExact(*report, 3);
 }
 
+// Never more frames than asked for, and a check behind the last one.
+TEST(Stress, PlaysAsManyFramesAsAskedFor) {
+    struct Case {
+        uint64_t frames, checks;  // one check behind every 20 frames and the one that settles
+    };
+    SilentProgress silent;
+    for (const auto& [frames, checks] : {Case{1, 1}, {5, 1}, {21, 1}, {22, 2}, {50, 3}}) {
+        const auto report =
+            stress(smallPack(), nullptr, {.frames = frames, .seconds_max = 0, .check_every = 20}, silent);
+        ASSERT_TRUE(report) << report.error().message;
+        EXPECT_EQ(report->frames, frames);
+        EXPECT_EQ(report->checks, checks) << frames;
+        EXPECT_TRUE(report->exact());
+    }
+}
+
 TEST(StressGpu, NoRuntimeEverDrifts) {
     const auto device = HeadlessDevice::create({.validation = true});
     if (!device) GTEST_SKIP() << device.error().message;

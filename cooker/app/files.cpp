@@ -1,0 +1,77 @@
+#include <app/files.h>
+
+#include <write/pack_writer.h>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace dimmer::cook {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isFile(const NamedFile& file) {
+    return !file.path.empty() && file.path != "-";
+}
+
+bool isStream(const fs::file_status& status) {
+    return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
+}
+
+bool same(const fs::path& a, const fs::path& b) {
+    std::error_code ignored;
+    const auto status_a = fs::status(a, ignored), status_b = fs::status(b, ignored);
+    if (isStream(status_a) || isStream(status_b)) return false;
+    if (fs::exists(status_a) && fs::exists(status_b)) return fs::equivalent(a, b, ignored);
+    // What is not there yet has no identity but its name.
+    const auto name = [&](const fs::path& path) {
+        const fs::path target = behindLinks(path).value_or(path);
+        const fs::path absolute = fs::absolute(target, ignored);
+        const fs::path canonical = fs::weakly_canonical(absolute, ignored);
+        return (ignored ? absolute : canonical).lexically_normal();
+    };
+    return name(a) == name(b);
+}
+
+Expected<void> checkApart(const NamedFile& output, const NamedFile& other) {
+    if (!isFile(output) || !isFile(other) || !same(output.path, other.path)) return {};
+    return fail(ErrorCode::InvalidArgument,
+                fmt::format("{} and {} are the same {}, {}; nothing was done", output.role, other.role,
+                            output.folder && other.folder ? "folder" : "file", output.path.string()));
+}
+
+// What is there of the path must be a folder that takes more.
+Expected<void> checkFolder(const NamedFile& output) {
+    const auto refused = [&](const fs::path& folder, int error) {
+        return fail(ErrorCode::Io, fmt::format("{} {}: no file can be made in {}: {}", output.role,
+                                               output.path.string(), folder.string(), strerror(error)));
+    };
+    std::error_code error;
+    fs::path there = fs::absolute(output.path, error);
+    while (fs::symlink_status(there, error).type() == fs::file_type::not_found && there.has_relative_path())
+        there = there.parent_path();
+    if (!fs::is_directory(there, error)) return refused(there, error ? error.value() : ENOTDIR);
+    if (faccessat(AT_FDCWD, there.c_str(), W_OK | X_OK, AT_EACCESS) != 0) return refused(there, errno);
+    return {};
+}
+
+}  // namespace
+
+Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
+    for (size_t i = 0; i < outputs.size(); ++i) {
+        if (!isFile(outputs[i])) continue;
+        for (const NamedFile& input : inputs)
+            if (auto ok = checkApart(outputs[i], input); !ok) return ok;
+        for (size_t j = 0; j < i; ++j)
+            if (auto ok = checkApart(outputs[i], outputs[j]); !ok) return ok;
+        if (auto ok = outputs[i].folder ? checkFolder(outputs[i]) : checkWritable(outputs[i].path); !ok) return ok;
+    }
+    return {};
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,118 @@
+// Files that a command writes: never its own input or another output, and looked at before the work, not after it.
+#include <app/tool_fixture.h>
+
+namespace dimmer::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+class Outputs : public ToolTest {
+   protected:
+    static std::string level() { return file("level.gltf"); }
+    static std::string points() { return write("points.csv", "x,y,z,nx,ny,nz\n1,0,1,0,1,0\n"); }
+
+    // One message and nothing else: no line of progress either, so nothing was begun.
+    static void expectRefusedAtOnce(const std::vector<std::string>& arguments, const std::vector<std::string>& words) {
+        const auto result = runDimmer(arguments);
+        EXPECT_EQ(result.exit_code, 2) << result.err;
+        EXPECT_THAT(result.out, IsEmpty());
+        EXPECT_TRUE(result.err.starts_with("dimmer: error: ")) << arguments[0] << "\n" << result.err;
+        EXPECT_EQ(std::ranges::count(result.err, '\n'), 1) << arguments[0] << "\n" << result.err;
+        for (const std::string& word : words) EXPECT_THAT(result.err, HasSubstr(word));
+    }
+    static void expectSameFile(const std::vector<std::string>& arguments, const std::string& a, const std::string& b) {
+        expectRefusedAtOnce(arguments, {a + " and " + b + " are the same file"});
+    }
+};
+
+TEST_F(Outputs, NeverTheLevelThePackOrOneAnother) {
+    const std::string level_bytes = readText(level()), pack_bytes = readText(pack());
+    const std::string new_pack = file("other.dimmer"), json = file("other.json"), csv = points();
+    expectSameFile({"cook", level(), "-o", level()}, "--output", "LEVEL");
+    expectSameFile({"cook", level(), "-o", new_pack, "--write-level", level()}, "--write-level", "LEVEL");
+    expectSameFile({"cook", level(), "-o", new_pack, "--report", new_pack}, "--report", "--output");
+    expectSameFile({"cook", level(), "-o", new_pack, "--json", json, "--report", json}, "--report", "--json");
+    expectSameFile({"cook", level(), "-o", file("quick.json"), "--profile", file("quick.json")}, "--output",
+                   "--profile");
+    expectSameFile({"inspect", pack(), "--json", pack()}, "--json", "PACK");
+    expectSameFile({"report", pack(), "-o", pack()}, "--output", "PACK");
+    expectSameFile({"report", pack(), "-o", file("cook.json"), "--cook", file("cook.json")}, "--output", "--cook");
+    for (const char* output : {"--json", "--csv", "--heatmap"})
+        expectSameFile({"verify", level(), pack(), output, pack()}, output, "PACK");
+    expectSameFile({"verify", level(), pack(), "--heatmap", json, "--json", json}, "--heatmap", "--json");
+    expectSameFile({"explain", pack(), "--point", "1,0,1", "--json", pack()}, "--json", "PACK");
+    expectSameFile({"bench", pack(), "--plot", pack()}, "--plot", "PACK");
+    expectSameFile({"bench", pack(), "--plot", json, "--json", json}, "--plot", "--json");
+    expectSameFile({"stress", pack(), "--json", pack()}, "--json", "PACK");
+    expectSameFile({"sample", pack(), "--points", csv, "-o", pack()}, "--output", "PACK");
+    expectSameFile({"sample", pack(), "--points", csv, "-o", csv}, "--output", "--points");
+    expectSameFile({"reference", level(), "--points", csv, "-o", level()}, "--output", "LEVEL");
+    expectSameFile({"export", pack(), pack()}, "DIR", "PACK");
+    EXPECT_EQ(readText(level()), level_bytes);
+    EXPECT_EQ(readText(pack()), pack_bytes);
+    for (const std::string& path : {new_pack, json}) EXPECT_FALSE(std::filesystem::exists(path)) << path;
+}
+
+TEST_F(Outputs, OtherNamesOfTheSameFile) {
+    const std::filesystem::path folder = std::filesystem::path(pack()).parent_path();
+    std::filesystem::create_directory(folder / "names");
+    std::filesystem::create_symlink("../level.dimmer", folder / "names/link");
+    std::filesystem::create_hard_link(pack(), folder / "names/hard");
+    for (const char* name : {"names/link", "names/hard", "names/../level.dimmer", "./level.dimmer"})
+        expectSameFile({"inspect", pack(), "--json", file(name)}, "--json", "PACK");
+    // Files that are not there yet.
+    std::filesystem::create_symlink("../new.json", folder / "names/new");
+    for (const char* name : {"names/new", "names/../new.json"})
+        expectSameFile({"bench", pack(), "--json", file("new.json"), "--plot", file(name)}, "--plot", "--json");
+    // Of an export too: the pack would be one of its files.
+    std::filesystem::create_directory(folder / "light");
+    std::filesystem::copy_file(pack(), folder / "light/index.json");
+    expectSameFile({"export", file("light/index.json"), file("light")}, "a file of DIR", "PACK");
+    EXPECT_EQ(readText(file("light/index.json")), readText(pack()));
+}
+
+TEST_F(Outputs, DevicesMayServeTwice) {
+    const auto result = runDimmer({"bench", pack(), "--mode", "cpu", "--frames", "1", "--only", "nothing", "--json",
+                                   "/dev/null", "--plot", "/dev/null"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
+TEST_F(Outputs, LookedAtBeforeTheWork) {
+    const std::string nowhere = file("nowhere/x"), csv = points();
+    const std::string taken = write("taken", "a file");
+    const auto expectNoFolder = [&](std::vector<std::string> arguments) {
+        expectRefusedAtOnce(arguments, {nowhere, "no folder"});
+    };
+    for (const char* output : {"--json", "--csv"}) expectNoFolder({"verify", level(), pack(), output, nowhere});
+    expectNoFolder({"reference", level(), "--points", csv, "-o", nowhere});
+    expectNoFolder({"stress", pack(), "--cpu", "--frames", "2000", "--json", nowhere});
+    expectNoFolder({"bench", pack(), "--json", nowhere});
+    expectNoFolder({"bench", pack(), "--plot", nowhere});
+    expectNoFolder({"sample", pack(), "--points", csv, "-o", nowhere});
+    expectNoFolder({"explain", pack(), "--point", "1,0,1", "--json", nowhere});
+    expectNoFolder({"synth", "--like", "safehouse", "-o", nowhere});
+    expectNoFolder({"report", pack(), "-o", nowhere});
+    expectRefusedAtOnce({"verify", level(), pack(), "--heatmap", taken}, {"--heatmap", "taken", "Not a directory"});
+    expectRefusedAtOnce({"verify", level(), pack(), "--heatmap", taken + "/deep/er"}, {"--heatmap", "Not a directory"});
+    expectRefusedAtOnce({"export", pack(), taken}, {"DIR", "Not a directory"});
+    EXPECT_FALSE(std::filesystem::exists(file("nowhere")));
+}
+
+TEST_F(Outputs, NumbersAndNamesThatMeanNothing) {
+    expectRefusedAtOnce({"bench", pack(), "--mode", "cpu", "--only", "nothing-like-that"},
+                        {"nothing-like-that", "nothing changed, set one toggled", "all sets changed"});
+    const auto expectRefused = [](const std::vector<std::string>& arguments, const char* option) {
+        const auto result = runDimmer(arguments);
+        EXPECT_EQ(result.exit_code, 2) << result.err;
+        EXPECT_THAT(result.err, AllOf(HasSubstr(option), HasSubstr("finite"), Not(HasSubstr("frames"))));
+    };
+    expectRefused({"stress", pack(), "--cpu", "--frames", "5", "--minutes", "nan"}, "--minutes");
+    expectRefused({"verify", file("level.gltf"), pack(), "--points", "1", "--paths", "2", "--max-error", "nan"},
+                  "--max-error");
+}
+
+}  // namespace
+}  // namespace dimmer::test
