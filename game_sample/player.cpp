@@ -98,7 +98,8 @@ class Player {
 
         const auto commands = commands_.begin();
         if (!commands) return std::unexpected(commands.error());
-        if (const auto recorded = lights_.record(*commands); !recorded) return std::unexpected(recorded.error());
+        const auto recorded = lights_.record(*commands);
+        if (!recorded) return std::unexpected(recorded.error());
         auto spheres = balls_.spheres(lights_);
         if (!spheres) return std::unexpected(spheres.error());
         spheres->insert(spheres->end(), probe_spheres_.begin(), probe_spheres_.end());
@@ -111,6 +112,8 @@ class Player {
         DIMMER_TRY(drawn);
         DIMMER_TRY(commands_.submitAndWait());
 
+        cost.stats = *recorded;
+        if (recorded->dispatches == 0) return cost;
         const auto stats = lights_.wait();  // the same update, now with its time on the GPU
         if (!stats) return std::unexpected(stats.error());
         cost.stats = *stats;

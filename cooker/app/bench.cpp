@@ -159,7 +159,8 @@ Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, con
         Runtime::create(device.context(), pack, {.mode = *mode.vulkan, .moving_probes_max = movingProbes(pack.data())});
     if (!runtime) return std::unexpected(std::move(runtime.error()));
     const Update update = [&]() -> Expected<UpdateStats> {
-        if (auto sent = runtime->submit(); !sent) return sent;
+        auto sent = runtime->submit();
+        if (!sent || sent->dispatches == 0) return sent;
         return runtime->wait();
     };
     Roof roof;

@@ -148,8 +148,9 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
     Remedy remedy;
     const double over = overBy(cost, profile);
     if (!(over > 1)) return remedy;
-    // Steps that fell short were too small for pages that do not shrink as their texels do: go further than it takes.
-    const double wanted = std::pow(density_margin / over, 1 + static_cast<double>(steps_before));
+    // Where two steps fell short already, pages do not shrink as their texels do: go further than it takes.
+    const double further = 0.5 * static_cast<double>(std::max<size_t>(steps_before, 1) - 1);
+    const double wanted = std::pow(density_margin / over, 1 + further);
     const double factor = std::min(losses.factorFor(wanted), density_factor_max);
     const float from = profile.texels_per_metre;
     const float to = std::max(0.01f, std::floor(from / static_cast<float>(factor) * 100) / 100);

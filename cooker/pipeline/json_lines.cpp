@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <utility>
 #include <vector>
 
 namespace dimmer::cook {
@@ -26,6 +27,7 @@ std::map<std::string, size_t> linesOfKeys(std::string_view text) {
     std::map<std::string, size_t> lines;
     std::vector<std::string> prefixes = {""};  // of the objects and arrays that are open
     std::string last;                          // the string read last: a key, if a colon follows
+    bool fresh = false;                        // no colon yet since then
     size_t line = 1, last_line = 1;
     for (size_t i = 0; i < text.size(); ++i) {
         const char c = text[i];
@@ -34,8 +36,9 @@ std::map<std::string, size_t> linesOfKeys(std::string_view text) {
             const size_t end = endOfString(text, i);
             last = decoded(text.substr(i, end - i));
             last_line = line;
+            fresh = true;
             i = end - 1;
-        } else if (c == ':') {
+        } else if (c == ':' && std::exchange(fresh, false)) {
             last = prefixes.back() + last;
             lines[last] = last_line;
         } else if (c == '{' || c == '[') {

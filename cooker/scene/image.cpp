@@ -44,6 +44,22 @@ bool isPngOrJpeg(std::span<const unsigned char> bytes) {
     return png || (bytes.size() > 3 && bytes[0] == 0xFF && bytes[1] == 0xD8 && bytes[2] == 0xFF);
 }
 
+constexpr size_t png_signature_bytes = 8;
+
+// Whether every chunk of a PNG ends within it: the decoder reserves what a chunk claims before it looks. True of
+// others.
+bool pngChunksFit(std::span<const unsigned char> bytes) {
+    if (bytes.size() < png_signature_bytes || bytes[0] != 0x89) return true;
+    constexpr size_t frame_bytes = 12;  // length, type, checksum
+    for (size_t at = png_signature_bytes; at + frame_bytes <= bytes.size();) {
+        const uint64_t length = uint64_t{bytes[at]} << 24 | bytes[at + 1] << 16 | bytes[at + 2] << 8 | bytes[at + 3];
+        if (length > bytes.size() - at - frame_bytes) return false;
+        if (bytes[at + 4] == 'I' && bytes[at + 5] == 'E') return true;  // IEND; what follows is nobody's
+        at += frame_bytes + length;
+    }
+    return true;
+}
+
 // Texel coordinates wrapped into 0..size-1.
 uint32_t wrap(float coordinate, uint32_t size) {
     const float wrapped = coordinate - std::floor(coordinate / static_cast<float>(size)) * static_cast<float>(size);
@@ -83,7 +99,7 @@ Expected<Image> decodeImage(const ImportContext& context, int index, TransferFun
     if (known && texels > image_texels_max)
         return context.error(
             owner, fmt::format("{} has {} x {} texels. Scale it to 8192 x 8192 or less.", label, width, height));
-    known = known && texels <= texels_per_byte_max * bytes.size();
+    known = known && texels <= texels_per_byte_max * bytes.size() && pngChunksFit(bytes);
     const std::unique_ptr<stbi_uc, void (*)(void*)> pixels(
         known ? stbi_load_from_memory(bytes.data(), size, &width, &height, &channels, 4) : nullptr, stbi_image_free);
     if (!pixels || width < 1 || height < 1)

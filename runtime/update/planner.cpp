@@ -185,13 +185,17 @@ void Planner::takeAll() {
     waiting_clusters_.clear();
 }
 
+// More steps of the format than this are plain to see. Where the base is black a step is tiny, and any light would be
+// more than all other changes of a level.
+constexpr float plain_quanta = 1023;
+
 // The most visible first; what has waited counts for more with every plan. By the square: something faint waits behind
-// what changes in every frame for as many plans as the root of how much more that shows.
+// what changes in every frame for as many plans as the root of how much more that shows, 32 at most.
 void Planner::takeWithin(uint32_t receivers) {
     const auto urgency = [&](uint32_t cluster) {
         const Waiting& waiting = waiting_[cluster];
         const auto waited = static_cast<float>(waiting.plans + 1);
-        return (waiting.quanta + 1) * waited * waited;
+        return (std::min(waiting.quanta, plain_quanta) + 1) * waited * waited;
     };
     std::ranges::sort(waiting_clusters_, [&](uint32_t a, uint32_t b) {
         const float first = urgency(a), second = urgency(b);

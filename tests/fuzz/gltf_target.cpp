@@ -104,13 +104,19 @@ std::vector<Bytes> gltfSeeds() {
     constexpr std::string_view size = "AAAAEAAAABCAYA";
     picture.replace(picture.find(size), size.size(), "AAIAAAACAACAYA");
     boasting.document["images"][0]["uri"] = picture;
+    cook::test::LevelFile endless = rare;  // a chunk of its picture claims 604 MB
+    picture = endless.document["images"][0]["uri"];
+    constexpr std::string_view chunk = "FcSJAAAADUlEQVR4";
+    picture.replace(picture.find(chunk), chunk.size(), "FcSJJAAADUlEQVR4");
+    endless.document["images"][0]["uri"] = picture;
     return {full.glb(),
             bytesOf(full.gltfText()),
             floor.glb(),
             bytesOf(floor.gltfText()),
             rare.glb(),
             bytesOf(rare.gltfText()),
-            bytesOf(boasting.gltfText())};
+            bytesOf(boasting.gltfText()),
+            bytesOf(endless.gltfText())};
 }
 
 }  // namespace dimmer::fuzz

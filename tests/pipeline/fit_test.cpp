@@ -196,18 +196,19 @@ TEST_F(Fit, FewerProbesWhereTheGridIsTooLarge) {
                 0.15 * static_cast<double>(all));
 }
 
-// Twice the budget: 0.97 of half the texels are left, or, where a step before fell short, the square of that share.
+// Twice the budget: 0.97 of half the texels are left, or, where steps before fell short, a power of
+// that share that grows by a half with each but the first.
 TEST(DensityBudget, GoesFurtherWhereAStepFellShort) {
     PackCost cost;
     cost.base_lightmap = 2000;
     Profile profile;
     profile.texels_per_metre = 8;
     profile.budget_base_lightmaps = 1000;
-    for (const size_t steps : {0u, 1u, 2u}) {
+    for (const auto& [steps, power] : {std::pair<size_t, double>{0, 1}, {1, 1}, {2, 1.5}, {4, 2.5}}) {
         const Remedy remedy = fittingRemedy({}, cost, profile, {}, steps);
         ASSERT_EQ(remedy.changes.size(), 1u);
         EXPECT_EQ(remedy.changes[0].key, "lightmaps.texels_per_metre");
-        const double share = std::pow(0.97 / 2, 1 + static_cast<double>(steps));
+        const double share = std::pow(0.97 / 2, power);
         EXPECT_NEAR(remedy.changes[0].to, 8 * std::sqrt(share), 0.0101);  // whole hundredths, rounded down
     }
 }

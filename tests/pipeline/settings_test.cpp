@@ -69,6 +69,8 @@ TEST(JsonLines, NestedKeysStringsAndArrays) {
     EXPECT_EQ(lines.at("a.cd"), 5u);
     EXPECT_EQ(lines.at("a2"), 6u);
     EXPECT_EQ(linesOfKeys("{\"a\": 1,\n\"a\": 2}").at("a"), 2u);
+    // What is no JSON any more makes no keys, and so no memory that grows with its square.
+    EXPECT_EQ(linesOfKeys("{\"a\": {\"b\": 1}} {\"c\": {\"d\"" + std::string(1000, ':')).size(), 4u);
 }
 
 TEST(Settings, AMistakeSaysItsLine) {
