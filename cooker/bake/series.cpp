@@ -29,7 +29,7 @@ constexpr float door_change_factor = 3;
 
 // Few rays find their way through a door, and what they find there is spread over the whole room by the bounces that
 // follow, where no later ray mends it. So many times as many look for doors alone.
-constexpr uint32_t door_rays_per_ray = 3;
+constexpr uint32_t door_rays_per_ray = 1;
 
 // After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
 // shrink evenly yet, later there is less to gain.
