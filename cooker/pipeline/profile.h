@@ -29,7 +29,7 @@ struct Quality {
     uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when what is still to come is below this share of the sum
-    uint32_t zstd_level = 12;        // of the pack's chunks
+    uint32_t zstd_level = 7;         // of the pack's chunks
     bool per_set_passes = false;     // see BakeSettings; from the command line alone
     bool light_grid = true;          // likewise
     std::string grid_baseline = {};  // likewise; see CookOptions

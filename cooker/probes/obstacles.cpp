@@ -65,13 +65,14 @@ std::array<Obstacle, 4> Obstacles::from(const Barycentric& point, const std::arr
     }
     const size_t groups = (count_ + lanes - 1) / lanes;
     std::array<Lanes, triangles_max / lanes> distance, second, third;
-    const auto here = [&](const Fields& f, size_t g) {
-        return point[0] * f[0][g] + point[1] * f[1][g] + point[2] * f[2][g] + point[3] * f[3][g];
+    // By reference: vectors of this size are returned in another way where the processor is not known to have them.
+    const auto fillHere = [&](const Fields& f, size_t g, Lanes& lanes_here) {
+        lanes_here = point[0] * f[0][g] + point[1] * f[1][g] + point[2] * f[2][g] + point[3] * f[3][g];
     };
     for (size_t g = 0; g < groups; ++g) {
-        distance[g] = here(distance_, g);
-        second[g] = here(second_, g);
-        third[g] = here(third_, g);
+        fillHere(distance_, g, distance[g]);
+        fillHere(second_, g, second[g]);
+        fillHere(third_, g, third[g]);
     }
     for (size_t v = 0; v < 4; ++v) {
         if (!wanted[v]) continue;
