@@ -2,11 +2,21 @@
 #include <fuzz/input_file.h>
 #include <fuzz/target.h>
 #include <pipeline/profile.h>
+#include <xxhash.h>
 
+#include <array>
 #include <cmath>
+#include <utility>
 
 namespace dimmer::fuzz {
 namespace {
+
+// Most changed inputs leave most settings as they were: reading the same text again would tell nothing.
+bool readBefore(const std::string& text) {
+    static std::array<uint64_t, 65536> hashes = {};  // the latest of each slot
+    const uint64_t hash = XXH3_64bits(text.data(), text.size());
+    return std::exchange(hashes[hash % hashes.size()], hash) == hash;
+}
 
 void checkProfile(const cook::Profile& profile) {
     require(profile.texels_per_metre > 0 && std::isfinite(profile.texels_per_metre), "a density is positive");
@@ -15,7 +25,9 @@ void checkProfile(const cook::Profile& profile) {
     for (const char* name : {"draft", "preview", "final"}) {
         const cook::Quality* quality = profile.quality(name);
         require(quality && quality->samples_per_texel > 0 && quality->rays > 0, "every quality traces rays");
-        const auto again = cook::readSettings(profile.settingsJson(name));
+        const std::string settings = profile.settingsJson(name);
+        if (readBefore(settings)) continue;
+        const auto again = cook::readSettings(settings);
         require(again && again->quality == name, "settings that were written can be read");
     }
 }
