@@ -15,11 +15,11 @@ namespace {
 
 constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
-constexpr double growth = 0.2;         // of the number of probes in a round, at most
+constexpr double growth = 0.3;         // of the number of probes in a round, at most
 constexpr uint32_t grow_rounds_max = 64;
 // The more sites there are to a probe, the more rounds of exchange find better ones among them; among thousands of
-// probes a round takes a second and hardly helps.
-constexpr size_t sites_per_exchange = 3, exchange_rounds_max = 16, exchanges_times_probes = 5000;
+// probes a round takes a second and mends half a hundredth of the error or nothing.
+constexpr size_t sites_per_exchange = 3, exchange_rounds_max = 16, exchanges_times_probes = 1000;
 constexpr size_t exchange_part = 5;  // one in so many is exchanged
 // Where there are few probes each of them counts, and a trial costs little: some 5 ms with sixty of them. With more
 // there are fewer moves; among thousands a handful would tell nothing.
@@ -85,8 +85,8 @@ class Placer {
     }
 
     size_t exchangeRounds() const {
-        return std::min({exchange_rounds_max, trial_.placeCount() / limit_ / sites_per_exchange,
-                         std::max<size_t>(1, exchanges_times_probes / limit_)});
+        return std::min(
+            {exchange_rounds_max, trial_.placeCount() / limit_ / sites_per_exchange, exchanges_times_probes / limit_});
     }
 
     // Those that do least go, but for those that are the only ones in sight of somewhere.

@@ -20,6 +20,8 @@ constexpr float importance_floor = 0.05f;  // of the mean light: darker places c
 // for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000.
 constexpr float floor_of_mean = 0.03f;
 constexpr float search_tolerance = 0.01f;  // of fits on the way: errors that count are larger
+// Of tables on the way: where there are few probes each of them counts, and all of a tetrahedron.
+constexpr size_t search_points_min = 12, search_points_times_probes = 12000;
 
 }  // namespace
 
@@ -30,7 +32,9 @@ TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<c
       states_(states),
       settings_(settings),
       places_(choice.places()),
-      first_corner_(places_.size() - choice.blocks.back().places_m.size()) {
+      first_corner_(places_.size() - choice.blocks.back().places_m.size()),
+      search_points_(static_cast<uint32_t>(
+          std::clamp<size_t>(search_points_times_probes / choice.probes_max, search_points_min, visibility_points))) {
     auto corner = static_cast<uint32_t>(first_corner_);
     for (const bool is_free : choice.corner_free) corners_.push_back(is_free ? corner++ : no_index);
     decideImportance();
@@ -101,7 +105,7 @@ Expected<void> TrialGrid::build(const ChosenProbes& probes) {
     std::ranges::copy(probes_.levels, result_.placement.grid.levels.begin());
     findPlaces();
     locatePlaces();
-    if (settings_.visibility) findVisibility();
+    if (settings_.visibility) findVisibility(search_points_);
     findShares();
     findErrors();
     return {};
@@ -115,6 +119,11 @@ void TrialGrid::restore(ChosenProbes probes, Result result) {
 }
 
 Placement TrialGrid::take() {
+    if (settings_.visibility) {
+        seen_.clear();
+        findVisibility(visibility_points);
+        findShares();
+    }
     // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
     result_.placement.sites.resize(first_corner_);
     return std::move(result_.placement);
@@ -183,7 +192,7 @@ TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
     return {name(t.probes[0]), name(t.probes[1]), name(t.probes[2]), name(t.probes[3])};
 }
 
-void TrialGrid::findVisibility() {
+void TrialGrid::findVisibility(uint32_t points) {
     GlobalGrid& grid = result_.placement.grid;
     grid.visibility.resize(grid.tetrahedra.size());
     std::vector<uint32_t> fresh, number(grid.tetrahedra.size(), no_index);
@@ -208,7 +217,7 @@ void TrialGrid::findVisibility() {
             corners[k] = vec(grid.positions[t.probes[k]]);
             free[k] = isFree(t.probes[k]);
         }
-        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[i], &cells_);
+        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[i], &cells_, points);
     });
     for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
 }

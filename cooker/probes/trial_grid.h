@@ -32,6 +32,7 @@ class TrialGrid {
     const Result& result() const { return result_; }
     // Takes an earlier result of build() for the last one.
     void restore(ChosenProbes probes, Result result);
+    // With tables as close as packs have them: those of build() are quick ones.
     Placement take();
 
     double meanError() const;
@@ -49,7 +50,7 @@ class TrialGrid {
     void findPlaces();
     void locatePlaces();
     Key keyOf(const Tetrahedron& t) const;
-    void findVisibility();
+    void findVisibility(uint32_t points);
     void findShares();
     void findErrors();
     float errorOf(const FitValue& light, const FitValue& traced) const;
@@ -62,6 +63,7 @@ class TrialGrid {
     std::vector<glm::vec3> places_;  // and behind them the free corners of the box
     size_t first_corner_;
     std::vector<uint32_t> corners_;  // per corner: its place, or no_index
+    uint32_t search_points_;
     float floor_lux_ = 0;
     std::vector<float> importance_;  // per place
     struct HashOfKey {

@@ -10,8 +10,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t samples = 32;
-constexpr size_t places_max = 32;
 // Rows that sort points alike differ in what of the geometry between they take for seen: the face of the wall that is
 // nearer to the probe has less, and hides what no point happened to stand at.
 constexpr uint32_t draw_scale = 1024;
@@ -76,13 +74,13 @@ std::array<Weights, corner_samples> pointsAtCorners() {
 class Table {
    public:
     Table(const RayScene& rays, const Obstacles& obstacles, const std::array<bool, 4>& free,
-          std::span<const Weights> places)
+          std::span<const Weights> places, uint32_t points)
         : rays_(rays), obstacles_(obstacles), free_(free) {
         for (const Weights& w : pointsAtCorners()) look(w);
-        for (uint32_t i = 0; i < tries_per_sample * samples && points_.size() - at_surfaces_ < corner_samples + samples;
+        for (uint32_t i = 0; i < tries_per_sample * points && points_.size() - at_surfaces_ < corner_samples + points;
              ++i)
             look(pointInside(sequence3d(i, 1)));
-        const size_t step = places.size() / places_max + 1;
+        const size_t step = places.size() / points + 1;
         for (size_t i = 0; i < places.size(); i += step) look(places[i]);
     }
 
@@ -242,9 +240,9 @@ class Table {
 
 TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
                                      const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places,
-                                     const TriangleCells* cells) {
+                                     const TriangleCells* cells, uint32_t points) {
     const Obstacles obstacles(rays, cells, corners);
-    if (!obstacles.none()) return Table(rays, obstacles, free, places).find();
+    if (!obstacles.none()) return Table(rays, obstacles, free, places, points).find();
     TetrahedronVisibility out;
     for (size_t v = 0; v < 4; ++v) out.seen[v] = free[v] ? seen_everywhere : seen_nowhere;
     return out;
