@@ -105,7 +105,7 @@ Expected<void> TrialGrid::build(const ChosenProbes& probes) {
     std::ranges::copy(probes_.levels, result_.placement.grid.levels.begin());
     findPlaces();
     locatePlaces();
-    if (settings_.visibility) findVisibility(search_points_);
+    if (settings_.visibility) findVisibility(Asked::AtPlaces, search_points_);
     findShares();
     findErrors();
     return {};
@@ -121,7 +121,7 @@ void TrialGrid::restore(ChosenProbes probes, Result result) {
 Placement TrialGrid::take() {
     if (settings_.visibility) {
         seen_.clear();
-        findVisibility(visibility_points);
+        findVisibility(Asked::Anywhere, visibility_points);
         findShares();
     }
     // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
@@ -192,11 +192,15 @@ TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
     return {name(t.probes[0]), name(t.probes[1]), name(t.probes[2]), name(t.probes[3])};
 }
 
-void TrialGrid::findVisibility(uint32_t points) {
+void TrialGrid::findVisibility(Asked asked, uint32_t points) {
     GlobalGrid& grid = result_.placement.grid;
-    grid.visibility.resize(grid.tetrahedra.size());
+    grid.visibility.assign(grid.tetrahedra.size(), {});
+    std::vector<uint8_t> wanted(grid.tetrahedra.size(), asked == Asked::Anywhere);
+    for (size_t i = 0; i < first_corner_; ++i)
+        if (!is_probe_[i]) wanted[result_.at[i].tetrahedron] = 1;
     std::vector<uint32_t> fresh, number(grid.tetrahedra.size(), no_index);
     for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) {
+        if (!wanted[t]) continue;
         const auto found = seen_.find(keyOf(grid.tetrahedra[t]));
         if (found != seen_.end()) {
             grid.visibility[t] = found->second;

@@ -50,7 +50,9 @@ class TrialGrid {
     void findPlaces();
     void locatePlaces();
     Key keyOf(const Tetrahedron& t) const;
-    void findVisibility(uint32_t points);
+    // Of tetrahedra in which somebody asks for light: a game may anywhere.
+    enum class Asked : uint8_t { AtPlaces, Anywhere };
+    void findVisibility(Asked asked, uint32_t points);
     void findShares();
     void findErrors();
     float errorOf(const FitValue& light, const FitValue& traced) const;
