@@ -86,6 +86,12 @@ Expected<Source> findSource(const std::string& name_or_file, const std::filesyst
     return Source{path.string(), path.filename().string(), path.parent_path(), text.str()};
 }
 
+std::string placeOf(const std::string& key, const Source& source) {
+    const auto lines = linesOfKeys(source.text);
+    const auto line = lines.find(key);
+    return line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
+}
+
 Expected<void> apply(Profile& profile, const Source& source, int depth);
 
 // The profile that this one starts from: what it names, else the default one.
@@ -105,13 +111,13 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     if (auto ok = applyBase(profile, *root, source, depth); !ok) return ok;
     std::map<std::string, json> values;
     flatten(*root, "", values);
-    const auto lines = linesOfKeys(source.text);
     const auto settings = settingsOf(profile);
     for (const auto& [key, value] : values) {
         if (key == "extends" || key == "description" || key == "$schema") continue;
-        const auto line = lines.find(key);
-        const std::string place = line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
-        if (auto ok = assignSetting(profile, settings, key, value, "profile " + place); !ok) return ok;
+        const auto assign = [&](const std::string& place) {
+            return assignSetting(profile, settings, key, value, "profile " + place);
+        };
+        if (!assign(source.name)) return assign(placeOf(key, source));  // once more, for a message that tells the line
         profile.origin[key] = source.origin;
     }
     return {};
