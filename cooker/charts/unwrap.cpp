@@ -142,20 +142,20 @@ bool tryPack(std::vector<stbrp_rect>& rects, int width, int height) {
     return stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size())) != 0;
 }
 
-std::vector<stbrp_rect> rectsOf(const std::vector<Placed>& charts, const std::vector<uint32_t>& ids) {
+std::vector<stbrp_rect> rectsOf(std::span<const glm::uvec2> charts, const std::vector<uint32_t>& ids) {
     std::vector<stbrp_rect> rects;
     for (uint32_t id : ids) {
         stbrp_rect r{};
         r.id = static_cast<int>(id);
-        r.w = static_cast<stbrp_coord>(charts[id].width);
-        r.h = static_cast<stbrp_coord>(charts[id].height);
+        r.w = static_cast<stbrp_coord>(charts[id].x);
+        r.h = static_cast<stbrp_coord>(charts[id].y);
         rects.push_back(r);
     }
     return rects;
 }
 
 // One page as small as will do, else as many of the largest size as are needed. Sides are multiples of 64 texels.
-bool packPages(const std::vector<Placed>& charts, uint32_t page_size, Unwrap& out) {
+bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& out) {
     constexpr uint32_t side_step = 64;
     std::vector<uint32_t> rest(charts.size());
     for (uint32_t i = 0; i < rest.size(); ++i) rest[i] = i;
@@ -168,9 +168,9 @@ bool packPages(const std::vector<Placed>& charts, uint32_t page_size, Unwrap& ou
     };
     uint64_t area = 0;
     uint32_t side = side_step;
-    for (const Placed& c : charts) {
-        area += uint64_t{c.width} * c.height;
-        side = std::max({side, c.width, c.height});
+    for (const glm::uvec2 c : charts) {
+        area += uint64_t{c.x} * c.y;
+        side = std::max({side, c.x, c.y});
     }
     auto roundUp = [](uint64_t v) { return static_cast<uint32_t>((v + side_step - 1) / side_step * side_step); };
     side = std::max(roundUp(side), roundUp(static_cast<uint64_t>(std::sqrt(static_cast<double>(area)))));
@@ -263,6 +263,21 @@ TangentFrame tangentFrame(const std::array<glm::vec3, 3>& p, const std::array<gl
     return {tangent, glm::dot(bitangent, along_v) < 0 ? -bitangent : bitangent, normal};
 }
 
+uint64_t pageTexels(std::span<const glm::uvec2> charts, uint32_t page_size) {
+    Unwrap out;
+    if (!packPages(charts, page_size, out)) return UINT64_MAX;
+    return uint64_t{out.page_width} * out.page_height * out.page_count;
+}
+
+glm::uvec2 chartSize(glm::uvec2 size, double factor) {
+    const auto side = [&](uint32_t texels) {
+        // Sides were rounded up, but where they are whole metres: rather too large than too small.
+        const double inner = static_cast<double>(texels - 2 * padding_texels) / factor;
+        return static_cast<uint32_t>(std::max(1.0, std::ceil(inner - 0.01))) + 2 * padding_texels;
+    };
+    return factor == 1 ? size : glm::uvec2(side(size.x), side(size.y));
+}
+
 Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
     Unwrap out;
     out.faces = listFaces(rays);
@@ -276,7 +291,9 @@ Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
         (out.faces[id].back ? out.back_face : out.front_face)[out.faces[id].triangle] = id;
 
     const std::vector<Placed> charts = makeCharts(rays, options, out);
-    if (!packPages(charts, options.page_size, out))
+    std::vector<glm::uvec2> sizes;
+    for (const Placed& c : charts) sizes.emplace_back(c.width, c.height);
+    if (!packPages(sizes, options.page_size, out))
         return fail(ErrorCode::BadInput,
                     fmt::format("{}: the lightmap needs more than 256 pages of {} x {} texels; lower "
                                 "lightmaps.texels_per_metre or raise lightmaps.page_size",

@@ -6,13 +6,18 @@
 #include <update/device_places.h>
 
 #include <algorithm>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <map>
 
 namespace dimmer::cook {
 namespace {
 
 constexpr uint64_t record_bytes = sizeof(TexelRecord);
 
-std::string megabytes(uint64_t bytes) {
+std::string humanBytes(uint64_t bytes) {
+    if (bytes < 1000) return fmt::format("{} B", bytes);
+    if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
     return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
 }
 
@@ -28,8 +33,32 @@ std::string largestElements(const PackData& pack, const PackCost& cost) {
         names.push_back(fmt::format(
             "{}'{}' {} ({:.0f} % of the records)",
             pack.elements[by_size[i].element].kind == ElementKind::Door ? "door " : "",
-            pack.elements[by_size[i].element].name, megabytes(by_size[i].bytes),
+            pack.elements[by_size[i].element].name, humanBytes(by_size[i].bytes),
             100 * static_cast<double>(by_size[i].bytes) / static_cast<double>(std::max<uint64_t>(cost.dynamic, 1))));
+    return fmt::format("{}", fmt::join(names, ", "));
+}
+
+// By what their triangles cover of the pages; double-sided ones by both sides.
+std::string largestMeshes(const PackData& pack) {
+    std::map<std::string, double> covered;
+    double all = 0;
+    for (const Mesh& mesh : pack.meshes)
+        for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+            const auto at = [&](size_t k) {
+                const auto& uv = mesh.vertices[mesh.indices[i + k]].lightmap_uv;
+                return glm::dvec2(uv[0], uv[1]);
+            };
+            const glm::dvec2 u = at(1) - at(0), v = at(2) - at(0);
+            const double area = std::abs(u.x * v.y - u.y * v.x) / 2;
+            covered[mesh.node] += area;
+            all += area;
+        }
+    std::vector<std::pair<double, std::string>> by_size;
+    for (const auto& [node, area] : covered) by_size.emplace_back(-area, node);
+    std::ranges::sort(by_size);
+    std::vector<std::string> names;
+    for (size_t i = 0; i < std::min<size_t>(3, by_size.size()); ++i)
+        names.push_back(fmt::format("'{}' ({:.0f} % of the charts)", by_size[i].second, -100 * by_size[i].first / all));
     return fmt::format("{}", fmt::join(names, ", "));
 }
 
@@ -71,8 +100,8 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
     std::vector<std::string> over;
     auto check = [&](std::string_view what, uint64_t bytes, uint64_t budget) {
         if (budget > 0 && bytes > budget)
-            over.push_back(fmt::format("{}: {} of {}, {} too much", what, megabytes(bytes), megabytes(budget),
-                                       megabytes(bytes - budget)));
+            over.push_back(fmt::format("{}: {} of {}, {} too much", what, humanBytes(bytes), humanBytes(budget),
+                                       humanBytes(bytes - budget)));
     };
     check("total", cost.device(), profile.budget_total);
     check("base lightmaps", cost.base_lightmap, profile.budget_base_lightmaps);
@@ -83,18 +112,21 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
         check(describe(pack.elements[e.element]), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
     std::string holders;
-    if (!cost.elements.empty()) holders = "; the largest elements: " + largestElements(pack, cost);
+    const bool records = (profile.budget_total > 0 && cost.device() > profile.budget_total) ||
+                         (profile.budget_dynamic > 0 && cost.dynamic > profile.budget_dynamic) ||
+                         std::ranges::any_of(cost.elements, [&](const ElementCost& e) {
+                             return profile.budget_per_element > 0 && e.bytes > profile.budget_per_element;
+                         });
+    if (records && !cost.elements.empty()) holders += "; the largest elements: " + largestElements(pack, cost);
+    if (profile.budget_base_lightmaps > 0 && cost.base_lightmap > profile.budget_base_lightmaps)
+        holders += "; the largest meshes: " + largestMeshes(pack);
+    if (profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid)
+        holders += fmt::format("; the grid has {} probes", pack.probes.global.positions.size());
     return fail(ErrorCode::OverBudget,
                 fmt::format("over budget, nothing was written: {}{}", fmt::join(over, "; "), holders));
 }
 
 namespace {
-
-std::string humanBytes(uint64_t bytes) {
-    if (bytes < 1000) return fmt::format("{} B", bytes);
-    if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
-    return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
-}
 
 std::string share(uint64_t bytes, uint64_t budget) {
     return budget == 0

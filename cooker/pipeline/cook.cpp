@@ -35,7 +35,7 @@ namespace dimmer::cook {
 namespace {
 
 // The cheapest ways out of a budget that a message names.
-constexpr int remedies_named = 3;
+constexpr size_t remedies_named = 3;
 
 class Stopwatch {
    public:
@@ -289,7 +289,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         baked = bakeWithCache(level, settings, scales, progress, cache);
         multiplyByScales(scales, baked);
         limitOverlap(baked, profile.overlap_max);
-        if (losses) *losses = LossTable(baked, texels, settings.group_thresholds, fixedTexels(rays, charts, texels));
+        if (losses)
+            *losses = LossTable(baked, texels, settings.group_thresholds, chartSizes(rays, charts, profile.page_size));
     }
     stats.rays = baked.rays;
     stats.bounces = baked.bounces;
@@ -362,6 +363,15 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
 // Each round of `--fit` cooks anew: more than a few mean that something does not follow its prediction.
 constexpr int fit_rounds_max = 6;
 
+// Those that are enough come first, so that a first one that is not tells of all.
+std::string waysOut(const std::vector<Remedy>& found) {
+    if (found.empty()) return "; no setting would mend it";
+    std::string text = found[0].fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
+    for (const Remedy& remedy : std::span(found).first(std::min<size_t>(found.size(), remedies_named)))
+        text += "\n  " + remedy.text() + (found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
+    return text;
+}
+
 // Cooks, and with `fit` changes result.profile and cooks again until the pack is within its budgets.
 Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
                               CookCache* cache, CookResult& result) {
@@ -376,14 +386,11 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         const auto within = checkBudgets(*pack, cost, result.profile);
         if (within) return pack;
         if (!fit || round + 1 == fit_rounds_max) {
-            std::string ways;
-            for (const Remedy& remedy : remedies(*pack, cost, result.profile, losses))
-                if (std::ranges::count(ways, '\n') < remedies_named) ways += "\n  " + remedy.text();
-            return fail(ErrorCode::OverBudget, within.error().message + (ways.empty() ? "; no setting alone would help"
-                                                                                      : "; what would help:" + ways));
+            return fail(ErrorCode::OverBudget,
+                        within.error().message + waysOut(remedies(*pack, cost, result.profile, losses)));
         }
-        const auto density_steps = std::ranges::count_if(
-            result.fitted, [](const Remedy& r) { return r.changes.front().key == "lightmaps.texels_per_metre"; });
+        const auto density_steps =
+            std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
         if (remedy.changes.empty())
             return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help");

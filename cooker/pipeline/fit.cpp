@@ -12,10 +12,13 @@
 namespace dimmer::cook {
 namespace {
 
-// The next density leaves this much room: charts do not shrink in proportion, as their padding stays.
-constexpr double density_margin = 0.97;
+// What is predicted leaves this much room: records of texels were up to 4 % more than charts' areas say on large
+// levels, up to 18 % on one of two rooms; tetrahedra go almost with probes.
+constexpr double density_margin = 0.92, probes_margin = 0.97;
 constexpr uint32_t local_probes_least = 8;  // a gradient along each axis
 constexpr double density_factor_max = 16;   // coarser pages are none
+constexpr int density_steps_max = 14;       // of halving: to a thousandth
+constexpr double error_max = 1;             // what costs more light than there is mends nothing
 
 // One budget that is set: what it would hold at some rungs.
 struct Limit {
@@ -32,23 +35,44 @@ bool localGridsAreOver(const PackCost& cost, const Profile& profile) {
     return profile.budget_local_grids > 0 && cost.local_grids > profile.budget_local_grids;
 }
 
-// Bytes of PackCost::dynamic that are not texels'.
+double ratio(uint64_t a, uint64_t b) {
+    return static_cast<double>(a) / static_cast<double>(std::max<uint64_t>(b, 1));
+}
+
+uint64_t scaled(uint64_t bytes, double share) {
+    return static_cast<uint64_t>(std::llround(static_cast<double>(bytes) * share));
+}
+
+uint64_t texelRecords(const LossTable& losses) {
+    return losses.dynamicBytes(Rungs(losses.groupCount(), 0));
+}
+
+// Bytes of PackCost::dynamic that are not texels'. They are not in the table of losses: thresholds are taken to drop as
+// large a share of them.
 uint64_t probeRecords(const PackCost& cost, const LossTable& losses) {
-    const uint64_t texels = losses.dynamicBytes(Rungs(losses.groupCount(), 0));
-    return cost.dynamic - std::min(cost.dynamic, texels);
+    return cost.dynamic - std::min(cost.dynamic, texelRecords(losses));
+}
+
+// Of the records that there are, the share that stays; what says where records belong goes with them.
+double recordsLeft(const LossTable& losses, const Rungs& rungs) {
+    const uint64_t all = texelRecords(losses);
+    return all > 0 ? ratio(losses.dynamicBytes(rungs), all) : 1;
 }
 
 std::vector<Limit> limitsOf(const PackData& pack, const PackCost& cost, const Profile& profile,
                             const LossTable& losses) {
     std::vector<Limit> limits;
     const auto records = [&losses](uint32_t g, uint8_t from, uint8_t to) { return losses.step(g, from, to).bytes; };
-    // Probes' records are not in the table: they are taken to stay, though thresholds drop some of them too.
-    const uint64_t of_probes = probeRecords(cost, losses);
-    const auto dynamic = [&losses, of_probes](const Rungs& rungs) { return losses.dynamicBytes(rungs) + of_probes; };
-    if (profile.budget_dynamic > 0) limits.push_back({profile.budget_dynamic, dynamic, records});
-    const uint64_t rest = cost.device() - cost.dynamic;
+    const auto left = [&losses](uint64_t bytes) {
+        return [&losses, bytes](const Rungs& rungs) { return scaled(bytes, recordsLeft(losses, rungs)); };
+    };
+    if (profile.budget_dynamic > 0) limits.push_back({profile.budget_dynamic, left(cost.dynamic), records});
+    const uint64_t stays = cost.base_lightmap + cost.global_grid + cost.local_grids;
     if (profile.budget_total > 0)
-        limits.push_back({profile.budget_total, [=](const Rungs& rungs) { return rest + dynamic(rungs); }, records});
+        limits.push_back(
+            {profile.budget_total,
+             [stays, rest = left(cost.dynamic + cost.ancillary)](const Rungs& rungs) { return stays + rest(rungs); },
+             records});
     const auto first_door =
         static_cast<uint32_t>(std::ranges::count(pack.elements, ElementKind::LightSet, &Element::kind));
     for (const ElementCost& e : cost.elements) {
@@ -82,7 +106,7 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                const std::vector<Limit>& limits, const Rungs& rungs) {
     Remedy remedy;
     const Loss loss = losses.loss(rungs);
-    remedy.saves = cost.dynamic - std::min(cost.dynamic, losses.dynamicBytes(rungs) + probeRecords(cost, losses));
+    remedy.saves = scaled(cost.dynamic, 1 - recordsLeft(losses, rungs));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
     remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
@@ -130,67 +154,117 @@ Rungs firstFitting(const LossTable& losses, const std::vector<Limit>& limits, ui
     return rungs;
 }
 
-// By how much the budgets that density helps with are exceeded; at most 1: not at all.
-double overBy(const PackCost& cost, const Profile& profile) {
-    double over = 0;
-    const auto compare = [&](uint64_t bytes, uint64_t budget) {
-        if (budget > 0) over = std::max(over, static_cast<double>(bytes) / static_cast<double>(budget));
+// A budget that density helps with: what of it are pages, what goes with charts' texels, and what stays.
+struct Share {
+    uint64_t budget, pages, texels, stays;
+
+    bool over() const { return budget > 0 && pages + texels + stays > budget; }
+    // Whether it fits with a little to spare, or, with `power` above 1, with more.
+    bool fitsWith(const LossTable::TexelsLeft& left, double power) const {
+        if (budget <= stays) return false;
+        const auto shrinking = static_cast<double>(pages + texels);
+        const double wanted = std::pow(density_margin * static_cast<double>(budget - stays) / shrinking, power);
+        return static_cast<double>(pages) * left.pages + static_cast<double>(texels) * left.charts <=
+               wanted * shrinking;
+    }
+};
+
+std::vector<Share> sharesOver(const PackCost& cost, const Profile& profile, const LossTable& losses) {
+    const uint64_t of_probes = probeRecords(cost, losses), of_texels = cost.dynamic - of_probes;
+    std::vector<Share> shares = {
+        {profile.budget_total, cost.base_lightmap, of_texels + cost.ancillary,
+         cost.global_grid + cost.local_grids + of_probes},
+        {profile.budget_base_lightmaps, cost.base_lightmap, 0, 0},
+        {profile.budget_dynamic, 0, of_texels, of_probes},
     };
-    compare(cost.device(), profile.budget_total);
-    compare(cost.base_lightmap, profile.budget_base_lightmaps);
-    compare(cost.dynamic, profile.budget_dynamic);
-    for (const ElementCost& e : cost.elements) compare(e.bytes, profile.budget_per_element);
-    return over;
+    for (const ElementCost& e : cost.elements) shares.push_back({profile.budget_per_element, 0, e.bytes, 0});
+    std::erase_if(shares, [](const Share& s) { return !s.over(); });
+    return shares;
+}
+
+bool pagesOrRecordsAreOver(const PackCost& cost, const Profile& profile) {
+    return !sharesOver(cost, profile, {}).empty();
 }
 
 // Saves nothing where no budget that it helps with is exceeded.
 Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses, size_t steps_before) {
     Remedy remedy;
-    const double over = overBy(cost, profile);
-    if (!(over > 1)) return remedy;
-    // Where two steps fell short already, pages do not shrink as their texels do: go further than it takes.
-    const double further = 0.5 * static_cast<double>(std::max<size_t>(steps_before, 1) - 1);
-    const double wanted = std::pow(density_margin / over, 1 + further);
-    const double factor = std::min(losses.factorFor(wanted), density_factor_max);
+    const std::vector<Share> over = sharesOver(cost, profile, losses);
+    if (over.empty()) return remedy;
+    // Where two steps fell short already, go further than it takes.
+    const double power = 1 + 0.5 * static_cast<double>(std::max<size_t>(steps_before, 1) - 1);
+    const auto enough = [&](double factor) {
+        const LossTable::TexelsLeft left = losses.texelsLeft(factor);
+        return std::ranges::all_of(over, [&](const Share& s) { return s.fitsWith(left, power); });
+    };
+    double too_little = 1, factor = density_factor_max;
+    remedy.fits = enough(factor) && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
+    for (int step = 0; step < density_steps_max; ++step) {
+        const double middle = std::sqrt(too_little * factor);
+        (enough(middle) ? factor : too_little) = middle;
+    }
     const float from = profile.texels_per_metre;
     const float to = std::max(0.01f, std::floor(from / static_cast<float>(factor) * 100) / 100);
-    if (!(to < from)) return remedy;
-    const double left = losses.texelsLeft(static_cast<double>(from) / static_cast<double>(to));
-    remedy.changes.push_back({"lightmaps.texels_per_metre", from, to});
-    remedy.fits = left <= 1 / over && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
-    remedy.error = losses.densityError(static_cast<double>(from) / static_cast<double>(to));
-    const uint64_t of_texels = cost.device() - cost.global_grid - cost.local_grids - probeRecords(cost, losses);
-    remedy.saves = static_cast<uint64_t>(static_cast<double>(of_texels) * (1 - left));
+    if (!(to < from)) return {};
+    factor = static_cast<double>(from) / static_cast<double>(to);
+    const LossTable::TexelsLeft left = losses.texelsLeft(factor);
+    remedy.changes.push_back({density_key, from, to});
+    remedy.error = losses.densityError(factor);
+    remedy.saves = scaled(cost.base_lightmap, std::max(0.0, 1 - left.pages)) +
+                   scaled(cost.dynamic - probeRecords(cost, losses) + cost.ancillary, 1 - left.charts);
     return remedy;
 }
 
-// Fewer probes, as bytes go with their number. Saves nothing where the grid is not the trouble.
-Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
+uint64_t globalProbes(const PackData& pack) {
+    return pack.probes.global.positions.size();
+}
+
+// Fewer probes, as bytes go with their number: `left` of them, a share.
+Remedy withProbes(const PackData& pack, const PackCost& cost, const Profile& profile, double left) {
     Remedy remedy;
     constexpr uint64_t corners = 8;  // of the grid's box, which are probes too
-    const uint64_t probes = pack.probes.global.positions.size();
-    double left = 1;
-    if (gridIsOver(cost, profile))
-        left = static_cast<double>(profile.budget_global_grid) / static_cast<double>(cost.global_grid);
-    if (profile.budget_total > 0 && cost.device() > profile.budget_total) {
-        const uint64_t excess = cost.device() - profile.budget_total;
-        const uint64_t bytes = cost.global_grid + probeRecords(cost, losses);
-        if (excess >= bytes) return remedy;
-        left = std::min(left, 1 - static_cast<double>(excess) / static_cast<double>(bytes));
-    }
-    if (left == 1 || probes <= corners) return remedy;
-    left *= density_margin;
-    const auto to = static_cast<uint64_t>(left * static_cast<double>(probes));
+    const uint64_t probes = globalProbes(pack);
+    if (!(left < 1) || probes <= corners) return remedy;
+    const auto to = static_cast<uint64_t>(probes_margin * left * static_cast<double>(probes));
     if (to <= corners) return remedy;
     remedy.changes.push_back(
         {"grids.probes_max", static_cast<float>(profile.probes_max), static_cast<float>(to - corners)});
-    remedy.saves = static_cast<uint64_t>(static_cast<double>(cost.global_grid) *
-                                         (1 - static_cast<double>(to) / static_cast<double>(probes)));
-    Profile others = profile;
-    others.budget_total = others.budget_global_grid = 0;
-    remedy.fits = !(overBy(cost, others) > 1) && !localGridsAreOver(cost, profile);
+    remedy.saves = scaled(cost.global_grid, 1 - ratio(to, probes));
     remedy.moves_light = true;
     return remedy;
+}
+
+// Saves nothing where the grid is not the trouble.
+Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
+    double left = 1;
+    if (gridIsOver(cost, profile)) left = ratio(profile.budget_global_grid, cost.global_grid);
+    if (profile.budget_total > 0 && cost.device() > profile.budget_total) {
+        const uint64_t excess = cost.device() - profile.budget_total;
+        const uint64_t bytes = cost.global_grid + probeRecords(cost, losses);
+        if (excess >= bytes) return {};
+        left = std::min(left, 1 - ratio(excess, bytes));
+    }
+    Remedy remedy = withProbes(pack, cost, profile, left);
+    Profile others = profile;
+    others.budget_total = others.budget_global_grid = 0;
+    remedy.fits = !pagesOrRecordsAreOver(cost, others) && !localGridsAreOver(cost, profile);
+    return remedy;
+}
+
+// Where the total is too much and a grid is a part of it: probes give their share, texels the rest.
+Remedy byAll(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
+             size_t density_steps) {
+    if (profile.budget_total == 0 || cost.device() <= profile.budget_total) return {};
+    const Remedy probes = withProbes(pack, cost, profile, ratio(profile.budget_total, cost.device()));
+    if (probes.changes.empty()) return {};
+    PackCost rest = cost;
+    rest.global_grid -= probes.saves;
+    Remedy both = byDensity(rest, profile, losses, density_steps);
+    if (both.changes.empty()) both.fits = !pagesOrRecordsAreOver(rest, profile);
+    both.changes.insert(both.changes.end(), probes.changes.begin(), probes.changes.end());
+    both.saves += probes.saves;
+    both.moves_light = true;
+    return both;
 }
 
 // Fewer probes for the models that have most: the largest number at which all fit. A grid may end up below it, as
@@ -212,7 +286,7 @@ Remedy byLocalProbes(const PackData& pack, const PackCost& cost, const Profile& 
     Profile others = profile;
     others.budget_local_grids = 0;
     remedy.fits =
-        bytesAt(to) <= profile.budget_local_grids && !(overBy(cost, others) > 1) && !gridIsOver(cost, profile);
+        bytesAt(to) <= profile.budget_local_grids && !pagesOrRecordsAreOver(cost, others) && !gridIsOver(cost, profile);
     remedy.moves_light = true;
     return remedy;
 }
@@ -237,11 +311,10 @@ std::string Remedy::text() const {
         if (parts.size() < named_max) parts.push_back(fmt::format("{} {} -> {}", c.key, c.from, c.to));
     const std::string more =
         changes.size() > named_max ? fmt::format(" and {} more", changes.size() - named_max) : std::string();
-    return fmt::format("{}{}: saves {:.2f} MB, adds a mean error of {:.2f} %{}", fmt::join(parts, ", "), more,
+    return fmt::format("{}{}: saves {:.2f} MB, adds a mean error of {:.2f} %{}{}", fmt::join(parts, ", "), more,
                        static_cast<double>(saves) / 1e6, 100 * error,
-                       energy > 0    ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy)
-                       : moves_light ? ", coarsens the light of models"
-                                     : "");
+                       energy > 0 ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy) : "",
+                       moves_light ? ", coarsens the light of models" : "");
 }
 
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
@@ -250,11 +323,13 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
     std::vector<Remedy> found;
     const auto add = [&](Remedy remedy) {
         const auto same = [&](const Remedy& other) { return other.changes == remedy.changes; };
-        if (remedy.saves == 0 || remedy.changes.empty() || std::ranges::any_of(found, same)) return;
+        if (remedy.saves == 0 || remedy.changes.empty() || remedy.error > error_max || std::ranges::any_of(found, same))
+            return;
         found.push_back(std::move(remedy));
     };
     add(byDensity(cost, profile, losses, 0));
     add(byProbes(pack, cost, profile, losses));
+    add(byAll(pack, cost, profile, losses, 0));
     add(byLocalProbes(pack, cost, profile));
     if (!baseIsOver(cost, profile) && exceeded(limits, Rungs(losses.groupCount(), 0))) {
         const auto by = [&](const Rungs& rungs) { add(byRungs(pack, cost, profile, losses, limits, rungs)); };
@@ -277,6 +352,7 @@ Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& 
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
         if (thresholds.fits && !thresholds.changes.empty()) return thresholds;
     }
+    if (Remedy all = byAll(pack, cost, profile, losses, density_steps); !all.changes.empty()) return all;
     return byDensity(cost, profile, losses, density_steps);
 }
 

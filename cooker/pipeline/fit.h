@@ -9,6 +9,8 @@
 
 namespace dimmer::cook {
 
+inline constexpr const char* density_key = "lightmaps.texels_per_metre";
+
 // A setting to change.
 struct Change {
     std::string key;
@@ -28,12 +30,13 @@ struct Remedy {
 
 // For a pack that is over a budget: raising thresholds where the least light goes for the bytes, raising all of them,
 // raising that of the set with the most records, lowering the density; fewer probes where the global grid is over, or
-// where they alone bring the total within its budget. None is empty. Those that fit first, then by error.
+// where they alone bring the total within its budget; or of probes and texels their share. None is empty, and none
+// costs more light than there is. Those that fit first, then by error.
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 
 // What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do;
-// further than predicted where so many steps of density fell short.
+// and of probes where the total is too much; further than predicted where so many steps of density fell short.
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                      size_t density_steps = 0);
 

@@ -41,6 +41,10 @@ struct StateLight {
     double above(size_t i) const { return static_cast<double>(lux[i] + floor_lux); }
 };
 
+uint64_t areaOf(glm::uvec2 size) {
+    return uint64_t{size.x} * size.y;
+}
+
 std::vector<uint32_t> copiesOf(const Texels& texels) {
     std::vector<uint32_t> copies(texels.size(), 1);
     for (const FillTexel& fill : texels.fills) ++copies[fill.source];
@@ -49,19 +53,39 @@ std::vector<uint32_t> copiesOf(const Texels& texels) {
 
 }  // namespace
 
-double fixedTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
-    const auto is_fixed = [&](size_t receiver) {
-        const uint32_t triangle = unwrap.faces[texels.sample(receiver, 0).face].triangle;
-        return rays.scene().meshes[rays.triangles()[triangle].mesh].texels_per_metre.has_value();
-    };
-    double fixed = 0;
-    for (size_t i = 0; i < texels.size(); ++i) fixed += is_fixed(i);
-    for (const FillTexel& fill : texels.fills) fixed += is_fixed(fill.source);
-    return fixed / static_cast<double>(std::max<size_t>(1, texels.size() + texels.fills.size()));
+LossTable::TexelsLeft LossTable::texelsLeft(double factor) const {
+    if (sizes_.charts.empty()) return {1 / (factor * factor), 1 / (factor * factor)};
+    std::vector<glm::uvec2> charts = sizes_.charts;
+    uint64_t before = 0, after = 0;
+    for (size_t i = 0; i < charts.size(); ++i) {
+        before += areaOf(charts[i]);
+        if (!sizes_.fixed[i]) charts[i] = chartSize(charts[i], factor);
+        after += areaOf(charts[i]);
+    }
+    const auto ratio = [](uint64_t a, uint64_t b) { return static_cast<double>(a) / static_cast<double>(b); };
+    return {ratio(after, before),
+            ratio(pageTexels(charts, sizes_.page_size), pageTexels(sizes_.charts, sizes_.page_size))};
 }
 
-LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, double fixed_texels)
-    : copies_(copiesOf(texels)), fixed_texels_(fixed_texels) {
+ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_size) {
+    ChartSizes out{page_size, {}, std::vector<bool>(unwrap.charts.size())};
+    for (const Chart& c : unwrap.charts) out.charts.emplace_back(c.width, c.height);
+    for (size_t f = 0; f < unwrap.faces.size(); ++f) {
+        const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[unwrap.faces[f].triangle].mesh];
+        out.fixed[unwrap.face_chart[f]] = mesh.texels_per_metre.has_value();
+    }
+    return out;
+}
+
+LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, ChartSizes sizes)
+    : copies_(copiesOf(texels)), sizes_(std::move(sizes)) {
+    uint64_t fixed = 0, all = 0;
+    for (size_t i = 0; i < sizes_.charts.size(); ++i) {
+        const uint64_t area = areaOf(sizes_.charts[i]);
+        all += area;
+        fixed += sizes_.fixed[i] ? area : 0;
+    }
+    fixed_texels_ = static_cast<double>(fixed) / static_cast<double>(std::max<uint64_t>(all, 1));
     uint32_t doors = 0;
     for (const Term& term : baked.terms) {
         steps_.resize(std::max<size_t>(steps_.size(), term.group + 1));

@@ -5,9 +5,7 @@
 #include <charts/texels.h>
 
 #include <array>
-#include <cmath>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -26,8 +24,13 @@ struct Loss {
     double energy = 0;   // share of the groups' stored light
 };
 
-// The share of the pages' texels whose meshes state a density of their own: they stay as many whatever the profile's.
-double fixedTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
+// What a profile's density changes: the sizes of charts, but of those whose meshes state a density of their own.
+struct ChartSizes {
+    uint32_t page_size = 0;
+    std::vector<glm::uvec2> charts;  // texels, padding included
+    std::vector<bool> fixed;
+};
+ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_size);
 
 // Records of a bake by the rung at which they go. A receiver counts once for every texel that shows it. Errors are
 // those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that
@@ -36,7 +39,7 @@ class LossTable {
    public:
     LossTable() = default;
     // `thresholds`: per light group, those of the bake.
-    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, double fixed_texels = 0);
+    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, ChartSizes sizes);
 
     // From the present thresholds to `rungs`.
     Loss loss(const Rungs& rungs) const;
@@ -48,13 +51,12 @@ class LossTable {
     // Mean relative error of texels `factor` times as long, against those there are: of second differences of the light
     // along the pages, an eighth of which a box of a texel and bilinear filtering lose where light is smooth.
     double densityError(double factor) const { return (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4; }
-    // Of texels `factor` times as long, the share that is left of how many there are.
-    double texelsLeft(double factor) const { return fixed_texels_ + (1 - fixed_texels_) / (factor * factor); }
-    // The factor at which `share` of them is left; infinite where none does.
-    double factorFor(double share) const {
-        return share > fixed_texels_ ? std::sqrt((1 - fixed_texels_) / (share - fixed_texels_))
-                                     : std::numeric_limits<double>::infinity();
-    }
+    // Of texels `factor` times as long, the share that is left of how many charts have, and of the pages, which charts
+    // do not fill. Without charts, as area goes. Cost: packs the charts anew.
+    struct TexelsLeft {
+        double charts = 1, pages = 1;
+    };
+    TexelsLeft texelsLeft(double factor) const;
 
     uint32_t groupCount() const { return static_cast<uint32_t>(steps_.size()); }
 
@@ -74,7 +76,8 @@ class LossTable {
     std::vector<uint32_t> copies_;                                 // texels that show a receiver
     std::vector<std::array<Step, threshold_rungs.size()>> steps_;  // per group: what goes at each rung
     double curvature_ = 0;
-    double fixed_texels_ = 0;
+    ChartSizes sizes_;
+    double fixed_texels_ = 0;  // share of charts' texels
 };
 
 }  // namespace dimmer::cook
