@@ -170,10 +170,11 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   fmt::format("the target's budgets and densities: {}, or a JSON file that extends one",
                               fmt::join(shippedProfiles(), ", ")))
         ->capture_default_str();
-    c->add_option("--quality", a->options.quality,
-                  "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
-        ->check(CLI::IsMember({"draft", "preview", "final"}))
-        ->capture_default_str();
+    auto* quality =
+        c->add_option("--quality", a->options.quality,
+                      "draft (seconds to a minute), preview, or final (what ships): rays and samples per texel")
+            ->check(CLI::IsMember({"draft", "preview", "final"}))
+            ->capture_default_str();
     c->add_option("--set", a->options.set,
                   "key=value: a setting of the profile (see profiles/schema.json), before what level and profile say")
         ->expected(1)
@@ -220,7 +221,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         "budget: exit code 3, nothing is written; Ctrl-C: 130, the old pack stays.\n"
         "Distances in levels are in metres, densities in texels per metre.\n"
         "Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
-    c->callback([a, &exit_code] { exit_code = run(*a); });
+    c->callback([a, quality, &exit_code] {
+        a->options.quality_is_chosen = quality->count() > 0;
+        exit_code = run(*a);
+    });
 }
 
 }  // namespace dimmer::cook

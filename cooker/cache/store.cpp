@@ -26,14 +26,15 @@ constexpr auto abandoned_after = std::chrono::hours(24);
 struct EntryHeader {
     std::array<char, 8> magic;
     uint64_t stored_bytes, real_bytes;
-    uint64_t hash_high, hash_low;  // XXH3, 128 bits, of the stored bytes
+    uint64_t hash_high, hash_low;  // XXH3, 128 bits, of the stored bytes, seeded with the entry's name
 };
-constexpr std::array<char, 8> entry_magic = {'D', 'I', 'M', 'C', 'A', 'C', 'H', '1'};
+constexpr std::array<char, 8> entry_magic = {'D', 'I', 'M', 'C', 'A', 'C', 'H', '2'};
 
-// Nothing where there is no such file.
+// Nothing where there is no such file: a folder opens, and claims to be without end.
 std::optional<std::vector<std::byte>> readFile(const fs::path& path) {
+    std::error_code ignored;
     std::ifstream file(path, std::ios::binary | std::ios::ate);
-    if (!file) return std::nullopt;
+    if (!file || !fs::is_regular_file(path, ignored)) return std::nullopt;
     std::vector<std::byte> bytes(static_cast<size_t>(std::max<std::streamoff>(file.tellg(), 0)));
     file.seekg(0);
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -41,23 +42,28 @@ std::optional<std::vector<std::byte>> readFile(const fs::path& path) {
     return bytes;
 }
 
-std::optional<std::vector<std::byte>> decode(std::span<const std::byte> file) {
+// One entry under another's name is as good as damaged.
+XXH128_hash_t hashOf(std::span<const std::byte> stored, std::string_view name) {
+    return XXH3_128bits_withSeed(stored.data(), stored.size(), XXH3_64bits(name.data(), name.size()));
+}
+
+std::optional<std::vector<std::byte>> decode(std::span<const std::byte> file, std::string_view name) {
     EntryHeader header{};
     if (file.size() < sizeof(header)) return {};
     std::memcpy(&header, file.data(), sizeof(header));
     const auto stored = file.subspan(sizeof(header));
     if (header.magic != entry_magic || stored.size() != header.stored_bytes) return {};
-    const XXH128_hash_t hash = XXH3_128bits(stored.data(), stored.size());
+    const XXH128_hash_t hash = hashOf(stored, name);
     if (hash.high64 != header.hash_high || hash.low64 != header.hash_low) return {};
     return Decompressor().run(stored, header.real_bytes);
 }
 
-std::vector<std::byte> encode(std::span<const std::byte> bytes) {
+std::vector<std::byte> encode(std::span<const std::byte> bytes, std::string_view name) {
     std::vector<std::byte> file(sizeof(EntryHeader) + ZSTD_compressBound(bytes.size()));
     std::byte* stored = file.data() + sizeof(EntryHeader);
     const size_t size =
         ZSTD_compress(stored, file.size() - sizeof(EntryHeader), bytes.data(), bytes.size(), compression_level);
-    const XXH128_hash_t hash = XXH3_128bits(stored, size);
+    const XXH128_hash_t hash = hashOf({stored, size}, name);
     const EntryHeader header{entry_magic, size, bytes.size(), hash.high64, hash.low64};
     std::memcpy(file.data(), &header, sizeof(header));
     file.resize(sizeof(header) + size);
@@ -74,25 +80,31 @@ Expected<CacheStore> CacheStore::open(fs::path folder) {
     return CacheStore(std::move(folder));
 }
 
-fs::path CacheStore::path(std::string_view kind, const Key& key) const {
-    return folder_ / fmt::format("{}-{}{}", kind, key.hex(), extension);
+std::string CacheStore::nameOf(std::string_view kind, const Key& key) {
+    return fmt::format("{}-{}{}", kind, key.hex(), extension);
+}
+
+void CacheStore::markUsed(const std::string& name) const {
+    const fs::path file = fs::path(name).filename();  // nothing outside of the folder
+    std::error_code ignored;
+    if (file.extension() == extension) fs::last_write_time(folder_ / file, fs::file_time_type::clock::now(), ignored);
 }
 
 Entry CacheStore::find(std::string_view kind, const Key& key) const {
-    const fs::path file = path(kind, key);
-    std::error_code ignored;
+    const std::string name = nameOf(kind, key);
     // One look alone: between two another cook's trim may remove it.
-    const auto content = readFile(file);
+    const auto content = readFile(folder_ / name);
     if (!content) return {};
-    auto bytes = decode(*content);
+    auto bytes = decode(*content, name);
     if (!bytes) return {Find::Damaged, {}};
-    fs::last_write_time(file, fs::file_time_type::clock::now(), ignored);
+    markUsed(name);
     return {Find::Hit, std::move(*bytes)};
 }
 
 Expected<void> CacheStore::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const {
     // Not flushed: what a power cut leaves half written is found to be damaged.
-    return writeFileAtomically(path(kind, key), encode(bytes), Flush::No);
+    const std::string name = nameOf(kind, key);
+    return writeFileAtomically(folder_ / name, encode(bytes, name), Flush::No);
 }
 
 uint64_t CacheStore::trim(uint64_t bytes_max) const {

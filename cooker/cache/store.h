@@ -14,7 +14,7 @@ namespace dimmer::cook {
 enum class Find {
     Hit,
     Missing,
-    Damaged,  // there, but not what was written: its hash is another
+    Damaged,  // there, but not what was written under this name: its hash is another
 };
 
 struct Entry {
@@ -31,6 +31,9 @@ class CacheStore {
 
     // Marks the entry as used just now.
     Entry find(std::string_view kind, const Key& key) const;
+    // As find() marks it, for those that say the name of an entry without its content; others are passed over.
+    void markUsed(const std::string& name) const;
+    static std::string nameOf(std::string_view kind, const Key& key);
     Expected<void> keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const;
 
     // Removes the entries that were used least recently until all together have at most `bytes_max`, and what killed
@@ -41,7 +44,6 @@ class CacheStore {
 
    private:
     explicit CacheStore(std::filesystem::path folder) : folder_(std::move(folder)) {}
-    std::filesystem::path path(std::string_view kind, const Key& key) const;
 
     std::filesystem::path folder_;
 };

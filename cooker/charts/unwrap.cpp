@@ -76,9 +76,23 @@ bool validUnwrap(const SceneMesh& mesh, std::string& why) {
     return true;
 }
 
+// A surface larger than a page is stored as coarse as fits one: told once for each mesh.
+void warnOfCoarseness(const RayScene& rays, Unwrap& out, uint32_t face, float texels, uint32_t side_max) {
+    const auto usable = static_cast<float>(side_max - 2 * padding_texels);
+    if (!(texels > usable + 1)) return;
+    const std::string owner = fmt::format("{}: node '{}': ", rays.scene().file,
+                                          rays.scene().meshes[rays.triangles()[out.faces[face].triangle].mesh].node);
+    if (std::ranges::any_of(out.warnings, [&](const std::string& w) { return w.starts_with(owner + "one of"); }))
+        return;
+    out.warnings.push_back(fmt::format(
+        "{}one of its surfaces is {:.0f} texels long, a page {}: it is stored {:.1f} times as coarse. Cut the "
+        "surface, raise lightmaps.page_size, or lower the density.",
+        owner, texels, side_max, texels / usable));
+}
+
 // A chart of the file's own UVs, scaled to the wanted density on average.
-Placed fileChart(const RayScene& rays, const std::vector<Face>& faces, std::vector<uint32_t> ids, float density,
-                 uint32_t side_max) {
+Placed fileChart(const RayScene& rays, Unwrap& out, std::vector<uint32_t> ids, float density, uint32_t side_max) {
+    const std::vector<Face>& faces = out.faces;
     const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh];
     double area_m2 = 0, area_uv = 0;
     glm::vec2 low(1), high(0);
@@ -93,6 +107,7 @@ Placed fileChart(const RayScene& rays, const std::vector<Face>& faces, std::vect
     }
     float scale = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
     const float extent = std::max(high.x - low.x, high.y - low.y);
+    warnOfCoarseness(rays, out, ids[0], scale * extent, side_max);
     scale = std::min(scale, (static_cast<float>(side_max - 2 * padding_texels) - 1) / extent);
     const glm::vec2 size = glm::ceil((high - low) * scale);
     Placed placed{static_cast<uint32_t>(size.x) + 2 * padding_texels,
@@ -232,12 +247,15 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
         planar_ids.push_back(id);
     }
     for (auto& [m, ids] : file_faces)
-        charts.push_back(fileChart(rays, out.faces, std::move(ids),
+        charts.push_back(fileChart(rays, out, std::move(ids),
                                    scene.meshes[m].texels_per_metre.value_or(options.texels_per_metre),
                                    options.page_size));
     auto blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
-    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, blocked))
+    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, blocked)) {
+        warnOfCoarseness(rays, out, planar_ids[c.faces[0]], std::max(c.size_m.x, c.size_m.y) * c.texels_per_metre,
+                         options.page_size);
         charts.push_back(planarChart(rays, out.faces, planar_ids, std::move(c), options.page_size));
+    }
     return charts;
 }
 

@@ -419,7 +419,7 @@ Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOp
     auto bytes = makePack(scene, options, progress, cache, result);
     if (bytes)
         cache->keepPack(key,
-                        {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations});
+                        {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations, {}});
     return bytes;
 }
 
@@ -443,6 +443,7 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     }
     if (!scene) return std::unexpected(scene.error());
     result.stats.warnings = scene->warnings;
+    if (options.quality_is_chosen) profile->origin["quality"] = "command line";
     if (auto ok = resolveSettings(*profile, *scene, options.set); !ok) return std::unexpected(ok.error());
     result.profile = *profile;
     auto cache = openCache(options, result.stats);

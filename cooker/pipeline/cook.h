@@ -20,6 +20,7 @@ struct CookOptions {
     std::filesystem::path level, pack;
     std::string profile = "desktop";
     std::string quality = "preview";
+    bool quality_is_chosen = true;  // on the command line, as the pack's settings then say
     std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
     uint32_t threads = 0;               // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against

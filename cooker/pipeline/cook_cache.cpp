@@ -24,6 +24,8 @@ std::vector<std::byte> toBytes(const PackEntry& entry) {
         out.putString(first);
         out.putString(second);
     }
+    out.put(static_cast<uint32_t>(entry.parts.size()));
+    for (const std::string& part : entry.parts) out.putString(part);
     out.putArray(std::span<const std::byte>(entry.pack));
     return out.take();
 }
@@ -38,6 +40,7 @@ std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
         first = in.getString();
         second = in.getString();
     }
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.parts.push_back(in.getString());
     entry.pack = in.getArray<std::byte>();
     return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
 }
@@ -86,13 +89,20 @@ std::string CookCache::whyMissing(Find find, const std::vector<std::string>& par
 
 std::optional<std::vector<std::byte>> CookCache::find(std::string_view kind, const std::string& what, const Key& key,
                                                       const std::vector<std::string>& parts) {
-    Entry entry = store_.find(kind, key);
+    Entry entry = look(kind, key);
     const bool hit = entry.find == Find::Hit;
     lines_.push_back({what, hit, hit ? "" : whyMissing(entry.find, parts)});
     return hit ? std::optional(std::move(entry.bytes)) : std::nullopt;
 }
 
+Entry CookCache::look(std::string_view kind, const Key& key) {
+    Entry entry = store_.find(kind, key);
+    if (entry.find == Find::Hit) used_.push_back(CacheStore::nameOf(kind, key));
+    return entry;
+}
+
 void CookCache::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) {
+    used_.push_back(CacheStore::nameOf(kind, key));
     const auto kept = store_.keep(kind, key, bytes);
     if (!kept && warnings_.empty()) warnings_.push_back("the cache takes no entries: " + kept.error().message);
 }
@@ -108,10 +118,16 @@ void CookCache::keepCharts(const Key& key, const ChartsEntry& entry) {
 
 std::optional<PackEntry> CookCache::findPack(const Key& key) {
     const auto bytes = find(pack_kind, "pack", key, {"code", "level", "settings"});
-    return bytes ? packFromBytes(*bytes) : std::nullopt;
+    auto entry = bytes ? packFromBytes(*bytes) : std::nullopt;
+    if (entry)
+        for (const std::string& part : entry->parts) store_.markUsed(part);
+    return entry;
 }
 
-void CookCache::keepPack(const Key& key, const PackEntry& entry) {
+void CookCache::keepPack(const Key& key, PackEntry entry) {
+    std::ranges::sort(used_);
+    used_.erase(std::unique(used_.begin(), used_.end()), used_.end());
+    entry.parts = used_;
     keep(pack_kind, key, toBytes(entry));
 }
 
@@ -135,7 +151,7 @@ void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
 
 std::vector<SiteBlockLight> CookCache::findSites(const std::string& what, const Key& key,
                                                  std::span<const SiteBlock> blocks) {
-    const Entry entry = store_.find(sites_kind, key);
+    const Entry entry = look(sites_kind, key);
     std::vector<SiteBlockLight> known;
     if (entry.find == Find::Hit) known = sitesFromBytes(entry.bytes).value_or(std::vector<SiteBlockLight>{});
     const auto is_known = [&](const SiteBlock& block) {
@@ -156,7 +172,7 @@ void CookCache::keepSites(const Key& key, std::span<const SiteBlockLight> sites)
 }
 
 std::optional<SparseLight> CookCache::findRadiance(const Key& key) {
-    const Entry entry = store_.find(radiance_kind, key);
+    const Entry entry = look(radiance_kind, key);
     return entry.find == Find::Hit ? radianceFromBytes(entry.bytes) : std::nullopt;
 }
 
@@ -165,7 +181,7 @@ void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
 }
 
 std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers) {
-    const Entry entry = store_.find(rays_kind, key);
+    const Entry entry = look(rays_kind, key);
     return entry.find == Find::Hit ? RayEnds::fromBytes(entry.bytes, rows, receivers) : std::nullopt;
 }
 

@@ -24,6 +24,7 @@ struct PackEntry {
     uint32_t bounces = 0;
     std::vector<std::string> warnings;
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
+    std::vector<std::string> parts;  // names of the entries that it was made from: whoever finds the pack uses them too
 };
 
 // The cache as one cook of one pack uses it. Remembers what the last cook of the pack depended on, to say what changed.
@@ -38,7 +39,7 @@ class CookCache {
     std::optional<ChartsEntry> findCharts(const Key& key);
     void keepCharts(const Key& key, const ChartsEntry& entry);
     std::optional<PackEntry> findPack(const Key& key);
-    void keepPack(const Key& key, const PackEntry& entry);
+    void keepPack(const Key& key, PackEntry entry);
     std::optional<GroupLight> findGroup(const std::string& what, const Key& key);
     void keepGroup(const Key& key, const GroupLight& light);
     // Of the global grid: all of it; a group's light at places where probes may stand, and what its surfaces send out.
@@ -63,12 +64,14 @@ class CookCache {
    private:
     std::optional<std::vector<std::byte>> find(std::string_view kind, const std::string& what, const Key& key,
                                                const std::vector<std::string>& parts);
+    Entry look(std::string_view kind, const Key& key);
     void keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes);
     std::string whyMissing(Find find, const std::vector<std::string>& parts) const;
 
     CacheStore store_;
     Key ledger_;
     std::map<std::string, std::string> last_, now_;  // part -> key
+    std::vector<std::string> used_;                  // entries found or kept, by name
     std::vector<CacheLine> lines_;
     std::vector<std::string> warnings_;
 };

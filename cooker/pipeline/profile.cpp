@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <set>
 #include <sstream>
 
 namespace dimmer::cook {
@@ -49,16 +50,36 @@ struct Source {
 // stack frame per level.
 constexpr int nesting_max = 3;
 
+// The library keeps the last of two equal keys.
+class KeysOnce {
+   public:
+    void see(json::parse_event_t event, const json& parsed) {
+        if (event == json::parse_event_t::object_start) open_.emplace_back();
+        if (event == json::parse_event_t::object_end && !open_.empty()) open_.pop_back();
+        if (event != json::parse_event_t::key || open_.empty()) return;
+        const auto key = parsed.get<std::string>();
+        if (!open_.back().insert(key).second && twice_.empty()) twice_ = key;
+    }
+    const std::string& twice() const { return twice_; }
+
+   private:
+    std::vector<std::set<std::string>> open_;
+    std::string twice_;
+};
+
 Expected<json> parseObject(const Source& source) {
     bool too_deep = false;
-    const auto shallow = [&](int depth, json::parse_event_t event, const json&) {
+    KeysOnce keys;
+    const auto shallow = [&](int depth, json::parse_event_t event, const json& parsed) {
         const bool start = event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
         too_deep = too_deep || (start && depth >= nesting_max);
+        keys.see(event, parsed);
         return !too_deep;
     };
     try {
         json root = json::parse(source.text, shallow);
         if (too_deep) return badProfile(source.name, "it nests deeper than any setting");
+        if (!keys.twice().empty()) return badProfile(source.name, fmt::format("'{}' is there twice", keys.twice()));
         if (root.is_object()) return root;
         return badProfile(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
     } catch (const json::exception& error) {
@@ -72,8 +93,11 @@ Expected<Source> findSource(const std::string& name_or_file, const std::filesyst
     for (const auto& [name, text] : shipped_profiles)
         if (name == name_or_file) return Source{std::string(name), std::string(name), {}, std::string(text)};
     const std::filesystem::path path = folder / name_or_file;
-    std::ifstream file(path, std::ios::binary);
-    if (!file || std::filesystem::is_directory(path)) {
+    std::error_code ignored;
+    // Not what never ends, as pipes and devices do.
+    const bool usable = std::filesystem::is_regular_file(path, ignored);
+    std::ifstream file(usable ? path : std::filesystem::path(), std::ios::binary);
+    if (!file) {
         const auto shipped = shippedProfiles();
         const std::string_view nearest = nearestName(name_or_file, {shipped.begin(), shipped.end()});
         return fail(
@@ -98,10 +122,11 @@ Expected<void> apply(Profile& profile, const Source& source, int depth);
 Expected<void> applyBase(Profile& profile, const json& root, const Source& source, int depth) {
     if (!root.contains("extends") && source.name == base_profile) return {};
     const json extends = root.value("extends", json(base_profile));
-    if (!extends.is_string()) return badProfile(source.name, "'extends' must be a shipped profile's name or a file");
-    if (depth >= extends_depth_max) return badProfile(source.name, "profiles extend one another in a circle");
+    const auto bad = [&](const std::string& text) { return badProfile(placeOf("extends", source), text); };
+    if (!extends.is_string()) return bad("'extends' must be a shipped profile's name or a file");
+    if (depth >= extends_depth_max) return bad("profiles extend one another in a circle");
     const auto base = findSource(extends.get<std::string>(), source.folder);
-    if (!base) return badProfile(source.name, "'extends': " + base.error().message);
+    if (!base) return bad("'extends': " + base.error().message);
     return apply(profile, *base, depth + 1);
 }
 
@@ -113,7 +138,11 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     flatten(*root, "", values);
     const auto settings = settingsOf(profile);
     for (const auto& [key, value] : values) {
-        if (key == "extends" || key == "description" || key == "$schema") continue;
+        if (key == "extends") continue;
+        if (key == "description" || key == "$schema") {
+            if (value.is_string()) continue;
+            return badProfile(placeOf(key, source), fmt::format("'{}' must be a text, not {}", key, value.type_name()));
+        }
         const auto assign = [&](const std::string& place) {
             return assignSetting(profile, settings, key, value, "profile " + place);
         };
@@ -140,7 +169,8 @@ const Quality* Profile::quality(const std::string& name) const {
 std::string Profile::settingsJson(const std::string& quality) const {
     Profile copy = *this;
     nlohmann::ordered_json out;
-    out["quality"] = {{"value", quality}, {"from", "command line"}};
+    const auto of_quality = origin.find("quality");
+    out["quality"] = {{"value", quality}, {"from", of_quality == origin.end() ? "default" : of_quality->second}};
     for (const Setting& s : settingsOf(copy)) {
         if (s.key.starts_with("bake.") && !s.key.starts_with("bake." + quality + ".")) continue;
         const auto from = origin.find(s.key);

@@ -71,14 +71,28 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
 }
 
 // "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
+// "records.max_overlap" and "records.overlap_max" have the same words.
+std::vector<std::string> sortedWords(std::string_view key) {
+    std::vector<std::string> words = {""};
+    for (const char c : key)
+        if (c == '.' || c == '_')
+            words.emplace_back();
+        else
+            words.back() += c;
+    std::ranges::sort(words);
+    return words;
+}
+
 std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
     if (key == "extends" || key == "description") return fmt::format("'{}' belongs in a profile's file", key);
     const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
     if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
     std::vector<std::string_view> known = {"extends", "description"};
     for (const Setting& s : settings) known.push_back(s.key);
-    if (const std::string_view nearest = nearestName(key, known); !nearest.empty())
-        return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
+    std::string_view nearest = nearestName(key, known);
+    const auto turned = std::ranges::find(known, sortedWords(key), [](std::string_view k) { return sortedWords(k); });
+    if (turned != known.end()) nearest = *turned;
+    if (!nearest.empty()) return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
     return fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", "));
 }
 

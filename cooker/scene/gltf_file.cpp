@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <scene/gltf_file.h>
+#include <scene/json_types.h>
 
 #include <algorithm>
 #include <cstring>
@@ -172,6 +173,7 @@ Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
                                                      file, nesting_max));
     const std::string folder = std::filesystem::absolute(path).parent_path().string();
     try {
+        if (auto ok = checkTypes(json, file); !ok) return std::unexpected(ok.error());
         Expected<tinygltf::Model> model = parse(*bytes, glb, folder, file);
         if (model && !model->asset.version.starts_with("2"))
             return fail(ErrorCode::BadInput,

@@ -230,6 +230,20 @@ TEST_F(CachedCook, APlayAreaMakesTheGridAlone) {
     EXPECT_THAT(made(level), ElementsAre("pack", "global grid"));
 }
 
+// Who finds the pack whole uses what it was made from: the next edit needs it.
+TEST_F(CachedCook, APackThatIsFoundKeepsItsParts) {
+    const LevelFile level = houseOfTwo();
+    run(level, true);
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
+    size_t entries = 0;
+    for (const auto& file : std::filesystem::directory_iterator(folder.path / "cache"))
+        std::filesystem::last_write_time(file, before), ++entries;
+    EXPECT_GT(entries, 5u);
+    EXPECT_THAT(made(level), IsEmpty());
+    for (const auto& file : std::filesystem::directory_iterator(folder.path / "cache"))
+        EXPECT_GT(std::filesystem::last_write_time(file), before) << file.path();
+}
+
 TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
     const LevelFile level = houseOfTwo();
     made(level);

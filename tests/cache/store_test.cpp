@@ -63,6 +63,34 @@ TEST(CacheStore, AnyDamageIsSeen) {
     EXPECT_EQ(rewrite(whole), Find::Hit);
 }
 
+TEST(CacheStore, AnEntryUnderAnothersNameIsNone) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    for (uint32_t i = 0; i < 2; ++i) ASSERT_TRUE(store->keep("light", keyOf(i), bytesOf("light of one")));
+    const auto file = [&](uint32_t i) { return folder.path / CacheStore::nameOf("light", keyOf(i)); };
+    std::filesystem::rename(file(0), file(1));
+    EXPECT_EQ(store->find("light", keyOf(1)).find, Find::Damaged);
+    ASSERT_TRUE(store->keep("light", keyOf(1), bytesOf("light of one")));
+    EXPECT_EQ(store->find("light", keyOf(1)).find, Find::Hit);
+    std::filesystem::create_directory(file(0));
+    EXPECT_EQ(store->find("light", keyOf(0)).find, Find::Missing);
+}
+
+// A pack that lists what is not an entry of the folder touches nothing.
+TEST(CacheStore, MarksNothingButEntries) {
+    const TemporaryFolder folder;
+    std::filesystem::create_directory(folder.path / "cache");
+    const auto store = CacheStore::open(folder.path / "cache");
+    ASSERT_TRUE(store);
+    const auto outside = writeText(folder, "light-1.entry", "not ours"),
+               inside = writeText(folder, "cache/notes.txt", "mine");
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
+    for (const auto& file : {outside, inside}) std::filesystem::last_write_time(file, before);
+    for (const char* name : {"../light-1.entry", "notes.txt", "", "light-2.entry"}) store->markUsed(name);
+    for (const auto& file : {outside, inside}) EXPECT_EQ(std::filesystem::last_write_time(file), before);
+}
+
 TEST(CacheStore, TheLeastRecentlyUsedGoFirst) {
     const TemporaryFolder folder;
     const auto store = CacheStore::open(folder.path);

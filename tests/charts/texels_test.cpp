@@ -44,5 +44,45 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
     }
 }
 
+// 400 m at 4 texels per metre are 1600 texels; a page of 256 keeps 254 of them: 6.3 times as coarse.
+TEST(Charts, SaysWhatIsTooLargeForAPage) {
+    Scene scene;
+    scene.file = "plain.glb";
+    addFloor(scene, 400, addMaterial(scene, lambert(0.5f)));
+    const RayScene rays(scene);
+    const auto coarse = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+    ASSERT_TRUE(coarse.has_value());
+    ASSERT_EQ(coarse->warnings.size(), 1u);
+    for (const std::string part : {"plain.glb: node '" + scene.meshes[0].node + "'", std::string("6.3 times as coarse"),
+                                   std::string("page_size")})
+        EXPECT_TRUE(coarse->warnings[0].contains(part)) << coarse->warnings[0];
+    EXPECT_TRUE(unwrap(rays, {.texels_per_metre = 4, .page_size = 4096})->warnings.empty());
+}
+
+// What a remedy says of a lower density: charts as unwrap() then makes them, and the pages that it packs.
+TEST(Charts, OfLongerTexelsAreForetold) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    for (int i = 0; i < 20; ++i)
+        addBox(scene, {0.3f + 0.37f * static_cast<float>(i % 5), 0.8f, 0.5f + 0.21f * static_cast<float>(i)}, white);
+    const RayScene rays(scene);
+    const auto fine = unwrap(rays, {.texels_per_metre = 8, .page_size = 2048});
+    ASSERT_TRUE(fine.has_value());
+    const auto texelsOf = [](const Unwrap& u) { return double(u.page_width) * u.page_height * u.page_count; };
+    std::vector<glm::uvec2> sizes;
+    for (const Chart& c : fine->charts) sizes.emplace_back(c.width, c.height);
+    EXPECT_EQ(static_cast<double>(pageTexels(sizes, 2048)), texelsOf(*fine));
+    for (const float density : {6.0f, 4.0f, 2.0f}) {
+        const auto coarse = unwrap(rays, {.texels_per_metre = density, .page_size = 2048});
+        ASSERT_TRUE(coarse.has_value());
+        std::vector<glm::uvec2> foretold;
+        for (const glm::uvec2 c : sizes) foretold.push_back(chartSize(c, double{8 / density}));
+        // Each side is at most one texel too long: of some 10 to 60 texels a quarter at the most; pages come in steps.
+        const double ratio = static_cast<double>(pageTexels(foretold, 2048)) / texelsOf(*coarse);
+        EXPECT_GE(ratio, 0.9) << density;
+        EXPECT_LE(ratio, 1.3) << density;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

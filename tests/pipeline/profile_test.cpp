@@ -70,6 +70,12 @@ TEST(Profile, UnknownKeysAreNamedWithTheNearest) {
     expectBad(R"({"lightmaps": {"page_sice": 512}})", {"'lightmaps.page_sice'", "did you mean 'lightmaps.page_size'?"});
     expectBad(R"({"lightmap": {"page_size": 512}})", {"did you mean 'lightmaps.page_size'?"});
     expectBad(R"({"extend": "desktop"})", {"'extend'", "did you mean 'extends'?"});
+    expectBad(R"({"records": {"max_overlap": 8}})", {"did you mean 'records.overlap_max'?"});
+    expectBad(R"({"grids": {"max_probes": 8}})", {"did you mean 'grids.probes_max'?"});
+    expectBad("{\"records\": {\"threshold\": 0.1,\n\"threshold\": 0.2}}", {"'threshold' is there twice"});
+    expectBad("{\n\"extends\": \"no such\"}", {":2: ", "'extends'", "no such"});
+    expectBad(R"({"description": 5})", {"'description' must be a text"});
+    expectBad(R"({"$schema": null})", {"'$schema' must be a text"});
     expectBad(R"({"zzzzzzzz": 1})", {"'zzzzzzzz' is no setting; there are: ", "budgets.total", "bake.final.tolerance"});
     expectBad(R"({"bake": {"draft": {"rays": {"deep": {"er": 1}}}}})", {"nests deeper"});
 }
@@ -134,7 +140,7 @@ TEST(Profile, SettingsSayWhereTheyComeFrom) {
     const auto profile = load(R"({"extends": "handheld", "records": {"threshold": 0.1}})");
     ASSERT_TRUE(profile.has_value());
     const json settings = json::parse(profile->settingsJson("preview"));
-    EXPECT_EQ(settings["quality"], json({{"value", "preview"}, {"from", "command line"}}));
+    EXPECT_EQ(settings["quality"], json({{"value", "preview"}, {"from", "default"}}));
     EXPECT_EQ(settings["records.threshold"], json({{"value", 0.1}, {"from", "mine.json"}}));
     EXPECT_EQ(settings["lightmaps.page_size"], json({{"value", 1024}, {"from", "handheld"}}));
     EXPECT_EQ(settings["bake.preview.rays"]["from"], "desktop");

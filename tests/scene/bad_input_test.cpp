@@ -116,6 +116,51 @@ TEST(SceneBadInput, IndicesOutOfRangeNameTheirOwner) {
     }
 }
 
+// The parser takes values of the wrong type for absent ones: floors would vanish without a word.
+TEST(SceneBadInput, ValuesOfTheWrongTypeNameTheirPlace) {
+    const Fault faults[] = {
+        {"mesh -1", [](json& d) { d["nodes"][1]["mesh"] = -1; }, {"node 'panel'", "'mesh'", "index", "-1"}},
+        {"mesh 'a'", [](json& d) { d["nodes"][1]["mesh"] = "a"; }, {"node 'panel'", "'mesh'", "\"a\""}},
+        {"mesh 0.5", [](json& d) { d["nodes"][1]["mesh"] = 0.5; }, {"node 'panel'", "'mesh'", "0.5"}},
+        {"translation", [](json& d) { d["nodes"][0]["translation"] = "x"; }, {"'floor'", "'translation'", "3 numbers"}},
+        {"short",
+         [](json& d) {
+             d["nodes"][0]["scale"] = {1, 2};
+         },
+         {"'floor'", "'scale'", "3 numbers", "[1,2]"}},
+        {"rotation",
+         [](json& d) {
+             d["nodes"][0]["rotation"] = {"a", 0, 0, 1};
+         },
+         {"'floor'", "'rotation'", "4 numbers"}},
+        {"children", [](json& d) { d["nodes"][0]["children"] = 3; }, {"'floor'", "'children'", "list"}},
+        {"colour",
+         [](json& d) { d["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = "red"; },
+         {"material 'white'", "'baseColorFactor'", "4 numbers", "red"}},
+        {"emission", [](json& d) { d["materials"][0]["emissiveFactor"] = 1; }, {"'white'", "'emissiveFactor'"}},
+        {"double-sided", [](json& d) { d["materials"][0]["doubleSided"] = 1; }, {"'white'", "true or false"}},
+        {"texture",
+         [](json& d) { d["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["index"] = "t"; },
+         {"'white'", "'index'"}},
+        {"indices", [](json& d) { d["meshes"][0]["primitives"][0]["indices"] = -1; }, {"mesh 0", "'indices'"}},
+        {"attribute",
+         [](json& d) { d["meshes"][0]["primitives"][0]["attributes"]["NORMAL"] = "n"; },
+         {"mesh 0", "'attributes'"}},
+        {"offset", [](json& d) { d["bufferViews"][0]["byteOffset"] = -4; }, {"buffer view 0", "'byteOffset'", "-4"}},
+        {"count", [](json& d) { d["accessors"][0]["count"] = "4"; }, {"accessor 0", "'count'", "whole number"}},
+        {"scene", [](json& d) { d["scene"] = -1; }, {"the file", "'scene'", "-1"}},
+        {"long",
+         [](json& d) { d["nodes"][0]["mesh"] = std::string(5000, 'x'); },
+         {"'floor'", "xxx...", "Export the level again"}},
+    };
+    for (const Fault& fault : faults) {
+        LevelFile level = fullLevel();
+        fault.apply(level.document);
+        SCOPED_TRACE(fault.name);
+        expectBadInput(level.import(), fault.message);
+    }
+}
+
 TEST(SceneBadInput, AccessorsBeyondTheirBytes) {
     static constexpr uint64_t huge = std::numeric_limits<uint64_t>::max();
     const Fault faults[] = {
