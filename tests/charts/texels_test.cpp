@@ -48,13 +48,13 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
 TEST(Charts, SaysWhatIsTooLargeForAPage) {
     Scene scene;
     scene.file = "plain.glb";
-    addFloor(scene, 400, addMaterial(scene, lambert(0.5f)));
+    addFloor(scene, 200, addMaterial(scene, lambert(0.5f)));
     const RayScene rays(scene);
     const auto coarse = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
     ASSERT_TRUE(coarse.has_value());
     ASSERT_EQ(coarse->warnings.size(), 1u);
-    for (const std::string part : {"plain.glb: node '" + scene.meshes[0].node + "'", std::string("6.3 times as coarse"),
-                                   std::string("page_size")})
+    const std::string node = "plain.glb: node '" + scene.meshes[0].node + "'";
+    for (const std::string& part : {node, std::string("6.3 times as coarse"), std::string("page_size")})
         EXPECT_TRUE(coarse->warnings[0].contains(part)) << coarse->warnings[0];
     EXPECT_TRUE(unwrap(rays, {.texels_per_metre = 4, .page_size = 4096})->warnings.empty());
 }
@@ -63,12 +63,17 @@ TEST(Charts, SaysWhatIsTooLargeForAPage) {
 TEST(Charts, OfLongerTexelsAreForetold) {
     Scene scene;
     const uint32_t white = addMaterial(scene, lambert(0.5f));
-    for (int i = 0; i < 20; ++i)
-        addBox(scene, {0.3f + 0.37f * static_cast<float>(i % 5), 0.8f, 0.5f + 0.21f * static_cast<float>(i)}, white);
+    for (int i = 0; i < 40; ++i) {
+        const auto side = static_cast<float>(i);
+        addQuad(scene, "quad", {0, 5 * side, 0}, {1.3f + 0.37f * static_cast<float>(i % 5), 0, 0},
+                {0, 0, 0.7f + 0.21f * side}, white);
+    }
     const RayScene rays(scene);
     const auto fine = unwrap(rays, {.texels_per_metre = 8, .page_size = 2048});
     ASSERT_TRUE(fine.has_value());
-    const auto texelsOf = [](const Unwrap& u) { return double(u.page_width) * u.page_height * u.page_count; };
+    const auto texelsOf = [](const Unwrap& u) {
+        return static_cast<double>(u.page_width) * u.page_height * u.page_count;
+    };
     std::vector<glm::uvec2> sizes;
     for (const Chart& c : fine->charts) sizes.emplace_back(c.width, c.height);
     EXPECT_EQ(static_cast<double>(pageTexels(sizes, 2048)), texelsOf(*fine));
