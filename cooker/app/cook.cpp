@@ -93,6 +93,8 @@ nlohmann::ordered_json suggestions(const CookStats& stats) {
 nlohmann::ordered_json toJson(const CookResult& result) {
     nlohmann::ordered_json json;
     json["seconds"] = result.stats.seconds;
+    auto& of_bake = json["bake_seconds"] = nlohmann::ordered_json::object();
+    for (const auto& [stage, seconds] : result.stats.bake_seconds) of_bake[stage] = seconds;
     json["rays"] = result.stats.rays;
     const auto bake = result.stats.seconds.find("bake");
     json["rays_per_second"] = bake == result.stats.seconds.end() || bake->second <= 0
@@ -114,6 +116,7 @@ Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
     input.title = a.options.pack.filename().string();
     input.file_bytes = result.file_bytes;
     input.seconds = result.stats.seconds;
+    input.bake_seconds = result.stats.bake_seconds;
     input.warnings = result.stats.warnings;
     return writeReport(*pack, input, a.report);
 }

@@ -30,6 +30,9 @@ Expected<void> addCook(const std::string& file, ReportInput& input) {
     if (!json) return std::unexpected(json.error());
     try {
         input.seconds = json->at("seconds").get<std::map<std::string, double>>();
+        if (const auto of_bake = json->find("bake_seconds"); of_bake != json->end())
+            for (const auto& [stage, seconds] : of_bake->items())
+                input.bake_seconds.emplace_back(stage, seconds.get<double>());
         input.warnings = json->at("warnings").get<std::vector<std::string>>();
     } catch (const nlohmann::json::exception&) {
         return fail(ErrorCode::BadInput, fmt::format("{}: it is not what `dimmer cook --json` writes", file));

@@ -286,7 +286,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     {
         Stopwatch watch(stats, "bake");
         const BakeSettings settings = bakeSettings(profile, *quality, scene);
-        baked = bakeWithCache(level, settings, scales, progress, cache);
+        StageTimer timer(progress, stats.bake_seconds);
+        baked = bakeWithCache(level, settings, scales, timer, cache);
         multiplyByScales(scales, baked);
         limitOverlap(baked, profile.overlap_max);
         if (losses)

@@ -6,6 +6,7 @@
 #include <pipeline/cook_cache.h>
 #include <pipeline/fit.h>
 #include <pipeline/profile.h>
+#include <pipeline/stage_timer.h>
 #include <scene/scene.h>
 
 #include <cstdint>
@@ -20,7 +21,7 @@ struct CookOptions {
     std::filesystem::path level, pack;
     std::string profile = "desktop";
     std::string quality = "preview";
-    bool quality_is_chosen = true;  // on the command line, as the pack's settings then say
+    bool quality_is_chosen = true;      // on the command line, as the pack's settings then say
     std::vector<std::string> set = {};  // "key=value": settings that go before the level's and the profile's
     uint32_t threads = 0;               // 0: as many as the machine has
     bool per_set_passes = false;  // one final gather per light group: a baseline to measure the shared one against
@@ -35,6 +36,7 @@ struct CookOptions {
 
 struct CookStats {
     std::map<std::string, double> seconds;  // per stage
+    StageSeconds bake_seconds;              // of "bake", what its stages took; not what reads and keeps entries
     uint64_t rays = 0;
     uint32_t bounces = 0;
     double free_volume_m3 = 0;  // of the level, where probes may stand

@@ -271,13 +271,17 @@ class Report {
         return {};
     }
 
+    void time(const std::string& stage, double seconds, double sum) {
+        body_ += bar(stage, sum > 0 ? seconds / sum : 0, fmt::format("{:.2f} s", seconds));
+    }
+
     void stages() {
         if (input_.seconds.empty()) return;
         double sum = 0;
         for (const auto& [stage, seconds] : input_.seconds) sum += seconds;
         body_ += "<h2>Time</h2>\n<div class=bars>\n";
-        for (const auto& [stage, seconds] : input_.seconds)
-            body_ += bar(stage, sum > 0 ? seconds / sum : 0, fmt::format("{:.2f} s", seconds));
+        for (const auto& [stage, seconds] : input_.seconds) time(stage, seconds, sum);
+        for (const auto& [stage, seconds] : input_.bake_seconds) time("bake: " + stage, seconds, sum);
         body_ += fmt::format("</div>\n<p class=dim>{:.2f} s in all.</p>\n", sum);
     }
 

@@ -70,6 +70,7 @@ TEST_F(Commands, CookPrintsItsTableAndKeepsProgressOnStderr) {
     const json figures = json::parse(readText(file("cook.json")));
     expectKeys(figures, {"seconds", "rays", "rays_per_second", "peak_bytes", "warnings"});
     expectKeys(figures["seconds"], {"import", "charts", "bake", "encode", "write"});
+    expectKeys(figures["bake_seconds"], {"direct light and links", "bounces", "final gather"});
     EXPECT_GT(figures["rays"], 0);
     EXPECT_EQ(figures["file_bytes"], std::filesystem::file_size(pack()));
     const auto piped = cook("piped.dimmer", {"--json", "-"});

@@ -79,13 +79,15 @@ TEST(Report, HoldsEverythingAndFetchesNothing) {
     ReportInput input{.title = "house.dimmer",
                       .file_bytes = 1234567,
                       .seconds = {{"bake", 12.5}, {"charts", 0.5}},
+                      .bake_seconds = {{"bounces", 2.25}},
                       .warnings = {"level.gltf: node 'lamp': it is inside a wall"},
                       .verify = {},
                       .heat_maps = {}};
     const std::string html = htmlOf(pack, input);
     EXPECT_THAT(html, AllOf(HasSubstr("<!doctype html>"), HasSubstr("width=device-width"), HasSubstr("house.dimmer"),
-                            HasSubstr("1.23 MB"), HasSubstr("12.50 s"), HasSubstr("13.00 s in all"),
-                            HasSubstr("node &#39;lamp&#39;: it is inside a wall"), HasSubstr("dynamic records")));
+                            HasSubstr("1.23 MB"), HasSubstr("12.50 s"), HasSubstr("bake: bounces"), HasSubstr("2.25 s"),
+                            HasSubstr("13.00 s in all"), HasSubstr("node &#39;lamp&#39;: it is inside a wall"),
+                            HasSubstr("dynamic records")));
     for (const Element& e : pack.elements())
         EXPECT_THAT(html, HasSubstr("region of " + std::string(e.kind == ElementKind::Door ? "door:" : "") + e.name));
     EXPECT_THAT(html, AllOf(Not(HasSubstr("http:")), Not(HasSubstr("https:")), Not(HasSubstr("src=\"//")),
