@@ -38,7 +38,7 @@ TEST_F(Streams, WorkIsDoneWithoutStderr) {
 }
 
 TEST_F(Streams, ExitCodesStayWithoutStderr) {
-    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
+    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 30000}})");
     const std::string far = write("far.csv", "x,y,z,nx,ny,nz\n99,0,0,0,1,0\n");
     for (const char* redirection : lost_stderr) {
         EXPECT_EQ(redirected(cookTo("no.dimmer", "tight.json"), redirection).exit_code, 3) << redirection;
@@ -77,7 +77,7 @@ TEST_F(Streams, OutputThatIsLostIsSaid) {
 
 // What --help of cook promises: stderr is lines of JSON and lines behind "dimmer: ", be it over budget or misused.
 TEST_F(Streams, EveryLineOfAMessageIsMarked) {
-    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
+    write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 30000}})");
     auto arguments = cookTo("no.dimmer", "tight.json");
     arguments.insert(arguments.end(), {"--progress", "json"});
     const auto over = runDimmer(arguments);
