@@ -212,7 +212,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   "MiB that the cache may hold; what was used least recently goes first")
         ->capture_default_str();
     c->add_flag("--fit", a->options.fit,
-                "over budget: raise the thresholds of the sets that lose least, or lower the density, until it fits; "
+                "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
+                "probes, until it fits; "
                 "the table says what was changed and the mean error that it adds");
     c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not");
     c->add_option(
