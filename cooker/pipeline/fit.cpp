@@ -53,9 +53,8 @@ uint64_t probeRecords(const PackCost& cost, const LossTable& losses) {
     return cost.dynamic - std::min(cost.dynamic, texelRecords(losses));
 }
 
-// Of the records that there are, the share that stays; what says where records belong goes with them.
-double recordsLeft(const LossTable& losses, const Rungs& rungs) {
-    const uint64_t all = texelRecords(losses);
+// Of all bytes of texels' records, the share that stays; what says where records belong goes with them.
+double recordsLeft(const LossTable& losses, uint64_t all, const Rungs& rungs) {
     return all > 0 ? ratio(losses.dynamicBytes(rungs), all) : 1;
 }
 
@@ -63,8 +62,8 @@ std::vector<Limit> limitsOf(const PackData& pack, const PackCost& cost, const Pr
                             const LossTable& losses) {
     std::vector<Limit> limits;
     const auto records = [&losses](uint32_t g, uint8_t from, uint8_t to) { return losses.step(g, from, to).bytes; };
-    const auto left = [&losses](uint64_t bytes) {
-        return [&losses, bytes](const Rungs& rungs) { return scaled(bytes, recordsLeft(losses, rungs)); };
+    const auto left = [&losses, all = texelRecords(losses)](uint64_t bytes) {
+        return [&losses, all, bytes](const Rungs& rungs) { return scaled(bytes, recordsLeft(losses, all, rungs)); };
     };
     if (profile.budget_dynamic > 0) limits.push_back({profile.budget_dynamic, left(cost.dynamic), records});
     const uint64_t stays = cost.base_lightmap + cost.global_grid + cost.local_grids;
@@ -106,7 +105,7 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                const std::vector<Limit>& limits, const Rungs& rungs) {
     Remedy remedy;
     const Loss loss = losses.loss(rungs);
-    remedy.saves = scaled(cost.dynamic, 1 - recordsLeft(losses, rungs));
+    remedy.saves = scaled(cost.dynamic, 1 - recordsLeft(losses, texelRecords(losses), rungs));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
     remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
