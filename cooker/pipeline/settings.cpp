@@ -70,7 +70,6 @@ Expected<void> assign(const Setting& setting, const json& value, const std::stri
     return assignNumber(setting, value, source);
 }
 
-// "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
 // "records.max_overlap" and "records.overlap_max" have the same words.
 std::vector<std::string> sortedWords(std::string_view key) {
     std::vector<std::string> words = {""};
@@ -83,6 +82,7 @@ std::vector<std::string> sortedWords(std::string_view key) {
     return words;
 }
 
+// "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
 std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
     if (key == "extends" || key == "description") return fmt::format("'{}' belongs in a profile's file", key);
     const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });

@@ -58,50 +58,30 @@ bool all(const json& v, auto&& is) {
     return std::all_of(v.begin(), v.end(), is);
 }
 
-bool obeys(const json& v, const Rule& rule) {
+// What the value must be; nothing where it is that.
+std::string missing(const json& v, const Rule& rule) {
+    const auto unless = [](bool obeys, std::string text) { return obeys ? std::string() : text; };
     switch (rule.kind) {
         case Kind::Index:
-            return isIndex(v);
+            return unless(isIndex(v), "an index from 0");
         case Kind::Indices:
-            return v.is_array() && all(v, isIndex);
+            return unless(v.is_array() && all(v, isIndex), "a list of indices from 0");
         case Kind::IndexOfEach:
-            return v.is_object() && all(v, isIndex);
+            return unless(v.is_object() && all(v, isIndex), "an object of indices from 0");
         case Kind::Whole:
-            return isWhole(v);
+            return unless(isWhole(v), "a whole number from 0");
         case Kind::Number:
-            return v.is_number();
-        case Kind::Numbers:
-            return v.is_array() && v.size() == rule.count && all(v, [](const json& n) { return n.is_number(); });
+            return unless(v.is_number(), "a number");
+        case Kind::Numbers: {
+            const bool numbers = v.is_array() && all(v, [](const json& n) { return n.is_number(); });
+            return unless(numbers && v.size() == rule.count, fmt::format("{} numbers", rule.count));
+        }
         case Kind::Text:
-            return v.is_string();
+            return unless(v.is_string(), "a text");
         case Kind::Flag:
-            return v.is_boolean();
+            return unless(v.is_boolean(), "true or false");
         case Kind::Object:
-            return v.is_object();
-    }
-    return false;
-}
-
-std::string expected(const Rule& rule) {
-    switch (rule.kind) {
-        case Kind::Index:
-            return "an index from 0";
-        case Kind::Indices:
-            return "a list of indices from 0";
-        case Kind::IndexOfEach:
-            return "an object of indices from 0";
-        case Kind::Whole:
-            return "a whole number from 0";
-        case Kind::Number:
-            return "a number";
-        case Kind::Numbers:
-            return fmt::format("{} numbers", rule.count);
-        case Kind::Text:
-            return "a text";
-        case Kind::Flag:
-            return "true or false";
-        case Kind::Object:
-            return "an object";
+            return unless(v.is_object(), "an object");
     }
     return {};
 }
@@ -161,12 +141,14 @@ class TypeChecker {
         if (!item.is_object()) return;
         for (const Rule& rule : rules) {
             const auto value = item.find(rule.key);
-            if (value == item.end() || obeys(*value, rule) || !problem_.empty()) continue;
+            if (value == item.end() || !problem_.empty()) continue;
+            const std::string expected = missing(*value, rule);
+            if (expected.empty()) continue;
             constexpr size_t length_max = 60;
             std::string text = value->dump(-1, ' ', true, json::error_handler_t::replace);
             if (text.size() > length_max) text = text.substr(0, length_max) + "...";
             problem_ = fmt::format("{}: {}: '{}' must be {}, not {}. Export the level again.", file_, owner, rule.key,
-                                   expected(rule), text);
+                                   expected, text);
         }
     }
 
