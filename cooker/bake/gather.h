@@ -185,7 +185,7 @@ class Gatherer {
     GatherFrom at(size_t receiver) const {
         if (receiver >= texels_.size()) {
             const size_t i = receiver - texels_.size();
-            return {{&models_.point(i), 1}, static_cast<uint32_t>(receiver), no_condition, models_.model(i)};
+            return {models_.points(i), static_cast<uint32_t>(receiver), no_condition, models_.model(i)};
         }
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
                 static_cast<uint32_t>(receiver),

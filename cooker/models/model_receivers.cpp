@@ -17,6 +17,8 @@ namespace {
 constexpr std::array<float, 7> ways_in = {0.03f, 0.06f, 0.1f, 0.18f, 0.3f, 0.45f, 0.6f};
 constexpr float clearance_m = 0.02f;
 constexpr uint32_t points_per_triangle = 16;
+constexpr size_t points_per_receiver = 8;
+constexpr float lift_m = 1e-3f;
 
 struct NearNormals {
     std::array<uint32_t, 3> index;
@@ -104,6 +106,32 @@ void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
     }
 }
 
+// Of the points of a surface that count for a receiver, some that are in the open, drawn without replacement, by weight
+// (Efraimidis and Spirakis 2006). A surface may lie in other geometry for the most part: some more are kept.
+class DrawnPoints {
+   public:
+    void offer(glm::vec3 point_m, float weight, uint32_t chance) {
+        if (!(weight > 0)) return;
+        drawn_.emplace_back(-std::log(1 - unitFloat(chance)) / weight, point_m);
+        if (drawn_.size() >= 2 * kept) prune();
+    }
+    std::vector<glm::vec3> inOpen(const RayScene& rays, uint32_t model) {
+        prune();
+        std::vector<glm::vec3> points;
+        for (const auto& [order, point] : drawn_)
+            if (points.size() < points_per_receiver && inTheOpen(rays, point, model, 0)) points.push_back(point);
+        return points;
+    }
+
+   private:
+    static constexpr size_t kept = 4 * points_per_receiver;
+    void prune() {
+        std::ranges::sort(drawn_, {}, &std::pair<float, glm::vec3>::first);
+        drawn_.resize(std::min(drawn_.size(), kept));
+    }
+    std::vector<std::pair<float, glm::vec3>> drawn_;
+};
+
 }  // namespace
 
 TangentFrame receiverFrame(uint32_t face) {
@@ -122,6 +150,7 @@ ModelReceivers::ModelReceivers(const RayScene& rays) : rays_(rays) {
         placeProbes(m);
         makeReceivers(m);
     }
+    first_point_.push_back(static_cast<uint32_t>(points_.size()));
 }
 
 void ModelReceivers::placeProbes(uint32_t index) {
@@ -170,27 +199,38 @@ void ModelReceivers::makeReceivers(uint32_t index) {
         area_m2 += area;
     });
     if (area_m2 > 0) model.reflectance = reflected / area_m2;
-    model.first_receiver = static_cast<uint32_t>(points_.size());
+    model.first_receiver = static_cast<uint32_t>(model_.size());
     const uint32_t probes = scene_model.probes.x * scene_model.probes.y * scene_model.probes.z;
-    for (uint32_t p = 0; p < probes; ++p)
-        for (uint32_t s = 0; s < model.slot_count; ++s) {
-            const auto normal = static_cast<uint32_t>(std::ranges::find(model.slots, s) - model.slots.begin());
-            points_.push_back({places_.position_m[model.first_probe + p], first_receiver_face + normal});
-            model_.push_back(index);
-            area_m2_.push_back(0);
-        }
+    const size_t first = area_m2_.size(), count = size_t{probes} * model.slot_count;
+    area_m2_.resize(first + count);
+    model_.resize(first + count, index);
+    std::vector<DrawnPoints> drawn(count);
+    uint32_t number = 0;
     forSurface(rays_, index, [&](glm::vec3 point, glm::vec3 normal, float area, glm::vec3) {
         const NearNormals normals = nearNormals(normal);
         const NearProbes near = nearProbes(scene_model, point);
+        ++number;
         for (size_t n = 0; n < 3; ++n)
             for (size_t k = 0; k < 8; ++k) {
                 const uint32_t source = places_.source[model.first_probe + near.number[k]];
                 const uint32_t slot = model.slots[normals.index[n]];
                 if (source == no_index || slot == no_index) continue;
-                area_m2_[model.first_receiver + (source - model.first_probe) * model.slot_count + slot] +=
-                    area * normals.share[n] * near.share[k];
+                const uint32_t receiver = (source - model.first_probe) * model.slot_count + slot;
+                const float share = area * normals.share[n] * near.share[k];
+                area_m2_[first + receiver] += share;
+                drawn[receiver].offer(point + lift_m * normal, share, hash(number, receiver));
             }
     });
+    std::vector<std::vector<glm::vec3>> places(count);
+    tbb::parallel_for(size_t{0}, count, [&](size_t i) { places[i] = drawn[i].inOpen(rays_, index); });
+    for (uint32_t p = 0; p < probes; ++p)
+        for (uint32_t s = 0; s < model.slot_count; ++s) {
+            const auto normal = static_cast<uint32_t>(std::ranges::find(model.slots, s) - model.slots.begin());
+            auto& at = places[size_t{p} * model.slot_count + s];
+            if (at.empty()) at.push_back(places_.position_m[model.first_probe + p]);
+            first_point_.push_back(static_cast<uint32_t>(points_.size()));
+            for (const glm::vec3 point_m : at) points_.push_back({point_m, first_receiver_face + normal});
+        }
 }
 
 uint32_t ModelReceivers::pick(uint32_t index, glm::vec3 point_m, glm::vec3 normal, uint32_t chance) const {

@@ -1,6 +1,6 @@
-// Models with light grids as the bounces see them: a few surfaces at each probe, one for each of 18 normals spread over
-// the sphere. Their light is gathered as that of texels is, without the model itself; a ray that hits the model picks
-// one of them.
+// Models with light grids as the bounces see them: for each probe a few receivers, one for each of 18 normals spread over
+// the sphere. Each stands for what of the surface is near to its probe and normal; its light is gathered there as that
+// of texels is, without the model itself. A ray that hits the model picks one of them.
 #pragma once
 
 #include <charts/texels.h>
@@ -30,9 +30,11 @@ class ModelReceivers {
     explicit ModelReceivers(const RayScene& rays);
 
     bool empty() const { return models_.empty(); }
-    size_t size() const { return points_.size(); }
-    // Its face is one for receiverFrame().
-    const SamplePoint& point(size_t i) const { return points_[i]; }
+    size_t size() const { return model_.size(); }
+    // One at least; their face is one for receiverFrame().
+    std::span<const SamplePoint> points(size_t i) const {
+        return std::span(points_).subspan(first_point_[i], first_point_[i + 1] - first_point_[i]);
+    }
     uint32_t model(size_t i) const { return model_[i]; }
     float areaM2(size_t i) const { return area_m2_[i]; }
     glm::vec3 reflectance(size_t i) const { return models_[model_[i]].reflectance; }
@@ -58,6 +60,7 @@ class ModelReceivers {
     const RayScene& rays_;
     std::vector<Model> models_;  // as in Scene::models; those that move are left empty
     std::vector<SamplePoint> points_;
+    std::vector<uint32_t> first_point_;  // per receiver, and the end
     std::vector<uint32_t> model_;
     std::vector<float> area_m2_;
     ProbePlaces places_;

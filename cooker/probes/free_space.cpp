@@ -5,22 +5,50 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t rays_per_test = 24;
+constexpr uint32_t few_rays = 24, many_rays = 192;
 constexpr uint32_t tries_per_place = 64;
+
+// What rays all around a place meet.
+class Surroundings {
+   public:
+    Surroundings(const RayScene& rays, glm::vec3 point_m, uint32_t ignored, float clearance_m)
+        : rays_(rays), point_m_(point_m), ignored_(ignored), clearance_m_(clearance_m) {}
+
+    void look(uint32_t begin, uint32_t end) {
+        for (uint32_t i = begin; i < end && !is_close_; ++i) {
+            const glm::vec3 direction = uniformSphereDirection(sequence2d(i, 1));
+            const auto hit = rays_.nearest(point_m_, direction, far_away_m, i, Surfaces::All, ignored_);
+            if (!hit) continue;
+            is_close_ = hit->distance_m < clearance_m_;
+            const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
+            const bool back = hit->back && !rays_.scene().materials[triangle.material].double_sided;
+            // The foot of a door's leaf often lies in the floor's plane, and shows through it from below.
+            if (triangle.condition != no_condition && !back) continue;
+            ++hits_;
+            backs_ += back;
+        }
+    }
+    bool looksOpen() const { return !is_close_ && 4 * backs_ < hits_; }
+    bool isSure() const { return backs_ == 0 && 4 * hits_ >= 3 * few_rays; }
+
+   private:
+    const RayScene& rays_;
+    glm::vec3 point_m_;
+    uint32_t ignored_;
+    float clearance_m_;
+    uint32_t hits_ = 0, backs_ = 0;
+    bool is_close_ = false;
+};
 
 }  // namespace
 
 bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored, float clearance_m) {
-    uint32_t hits = 0, backs = 0;
-    for (uint32_t i = 0; i < rays_per_test; ++i) {
-        const glm::vec3 direction = uniformSphereDirection(sequence2d(i, 1));
-        const auto hit = rays.nearest(point_m, direction, far_away_m, i, Surfaces::All, ignored);
-        if (!hit) continue;
-        if (hit->distance_m < clearance_m) return false;
-        ++hits;
-        backs += hit->back && !rays.scene().materials[rays.triangles()[hit->triangle].material].double_sided;
-    }
-    return hits > 0 && 4 * backs < hits;
+    Surroundings around(rays, point_m, ignored, clearance_m);
+    around.look(0, few_rays);
+    if (!around.looksOpen() || around.isSure()) return around.looksOpen();
+    // Of thousands of places outside of a level, from where most rays meet nothing, some pass by luck.
+    around.look(few_rays, many_rays);
+    return around.looksOpen();
 }
 
 std::vector<glm::vec3> openPlaces(const RayScene& rays, uint32_t count, uint32_t seed) {

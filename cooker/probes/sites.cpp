@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <map>
 
 namespace dimmer::cook {
@@ -15,14 +16,16 @@ namespace {
 
 // On average over the free space: the grid need not be denser to be as right as lightmaps are.
 constexpr double density_max_per_m3 = 1;
-// Small levels can have more sites, and need them, as single probes matter.
+// Small levels can have more sites, and need them, as single probes matter; large ones cannot pay for all that are
+// asked.
 constexpr double small_sites_per_probe = 40, small_sites = 4000;
-constexpr double sites_max = 60000;
+constexpr double many_sites = 60000, sites_per_probe_min = 3;
 constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
 constexpr uint32_t tries_per_site = 16;
-// Half of the places are near a lamp, where light changes over a hand's breadth.
+// Half of the places are near a lamp, where light changes over a hand's breadth: nearer than this many times the
+// spacing of the others, so that what lies around that is not left to chance.
 constexpr double share_near_lamps = 0.5;
-constexpr float lamp_reach_m = 0.8f;
+constexpr double lamp_reach_spacings = 2.2;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
 constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
@@ -66,12 +69,16 @@ class Chooser {
         const glm::dvec3 size = glm::dvec3(rays_.boundsMax()) - glm::dvec3(rays_.boundsMin());
         out_.free_volume_m3 =
             static_cast<double>(std::ranges::count(is_free, 1)) / first_look * size.x * size.y * size.z;
-        const auto most = static_cast<double>(settings_.probes_max);
         // The box's corners are probes too.
-        const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0), most));
+        const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0),
+                                                  static_cast<double>(settings_.probes_max)));
         out_.probes_max = static_cast<size_t>(probes);
-        const double wanted = std::max(settings_.sites * probes, std::min(small_sites_per_probe * probes, small_sites));
-        return static_cast<uint32_t>(std::min(wanted, sites_max));
+        const double least = std::min(small_sites_per_probe * probes, small_sites);
+        const double most = std::max(many_sites, sites_per_probe_min * probes);
+        const double wanted = std::clamp(settings_.sites * probes, least, most);
+        const double spacing_m = std::cbrt(out_.free_volume_m3 / ((1 - share_near_lamps) * wanted));
+        lamp_reach_m_ = static_cast<float>(lamp_reach_spacings * spacing_m);
+        return static_cast<uint32_t>(wanted);
     }
 
     glm::vec3 anywhere(uint32_t i) const {
@@ -79,9 +86,9 @@ class Chooser {
         return low + size * glm::vec3(radicalInverse(2, i + 1), radicalInverse(3, i + 1), radicalInverse(5, i + 1));
     }
     // Uniform in the distance, so that each shell around a lamp gets as many: light there falls with its square.
-    static glm::vec3 nearLamp(glm::vec3 lamp_m, uint32_t i) {
+    glm::vec3 nearLamp(glm::vec3 lamp_m, uint32_t i) const {
         const glm::vec3 u = sequence3d(i, site_seed);
-        return lamp_m + lamp_reach_m * u.z * uniformSphereDirection({u.x, u.y});
+        return lamp_m + lamp_reach_m_ * u.z * uniformSphereDirection({u.x, u.y});
     }
 
     std::vector<uint8_t> test(uint32_t begin, uint32_t count, auto&& at) const {
@@ -119,6 +126,7 @@ class Chooser {
     const RayScene& rays_;
     const GridSettings& settings_;
     std::vector<glm::vec3> lamps_;
+    float lamp_reach_m_ = 0;
     SiteChoice out_;
 };
 
