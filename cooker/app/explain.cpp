@@ -16,9 +16,23 @@ namespace dimmer::cook {
 namespace {
 
 struct ExplainArguments {
-    std::string pack, state, json;
+    std::string pack, state, from, json;
     std::vector<float> point, normal;
 };
+
+// Of the receivers that light a place.
+struct Stored {
+    uint32_t record_bytes;
+    uint64_t receivers(const PackData& d, uint32_t contribution) const {
+        if (record_bytes == sizeof(TexelRecord)) return d.contributions[contribution].receivers;
+        return d.probes.record_counts.empty() ? 0 : d.probes.record_counts[contribution];
+    }
+    uint64_t bytes(const PackData& d, uint32_t contribution) const { return receivers(d, contribution) * record_bytes; }
+};
+
+Stored storedFor(const Explanation& e) {
+    return {static_cast<uint32_t>(e.surface ? sizeof(TexelRecord) : sizeof(ProbeRecord))};
+}
 
 std::string weightText(const Weight& w) {
     return w.r == w.g && w.g == w.b ? fmt::format("{:.3g}", w.r) : fmt::format("{:.3g}/{:.3g}/{:.3g}", w.r, w.g, w.b);
@@ -28,82 +42,107 @@ std::string luxText(const std::array<float, 3>& lux) {
     return fmt::format("{:.4g} {:.4g} {:.4g}", lux[0], lux[1], lux[2]);
 }
 
-uint64_t bytesOf(const Contribution& c) {
-    return uint64_t{c.receivers} * sizeof(TexelRecord);
+std::string receiverText(const ReceiverView& view, const ReceiverPlace& at) {
+    if (!at.cluster) return "no contribution is stored there: it never changes";
+    const Cluster& c = view.clusters[*at.cluster];
+    return fmt::format("cluster {} of {} receivers with {} contributions, {} of records; batch {} of {} receivers",
+                       *at.cluster, c.receiver_count, c.term_count,
+                       humanBytes((uint64_t{c.term_count} + 1) * c.receiver_count * view.record_bytes), *at.batch,
+                       view.batches[*at.batch].receiver_count);
 }
 
 void printPlace(const PackData& d, const Explanation& e) {
-    const Mesh& mesh = d.meshes[e.surface.mesh];
-    const glm::vec3 n = e.surface.frame.normal;
-    fmt::print("{}: page {}, texel {}, {}; {:.1f} cm from the point, facing {:.2f},{:.2f},{:.2f}\n", mesh.node,
-               mesh.page, e.texel[0], e.texel[1], 100 * static_cast<double>(e.surface.distance_m), n.x, n.y, n.z);
-    if (!e.cluster) {
-        fmt::print("no contribution is stored there: the texel never changes\n");
-        return;
+    if (e.surface) {
+        const SurfacePlace& place = e.surface->place;
+        const Mesh& mesh = d.meshes[place.mesh];
+        const glm::vec3 n = place.frame.normal;
+        fmt::print("{}: page {}, texel {}, {}; {:.1f} cm from the point, facing {:.2f},{:.2f},{:.2f}\n{}\n", mesh.node,
+                   mesh.page, e.surface->texel[0], e.surface->texel[1], 100 * static_cast<double>(place.distance_m),
+                   n.x, n.y, n.z, receiverText(d.texelView(), e.surface->receiver));
     }
-    const Cluster& c = d.clusters[*e.cluster];
-    fmt::print("cluster {} of {} receivers with {} contributions, {} of records; batch {} of {} receivers\n",
-               *e.cluster, c.receiver_count, c.term_count,
-               humanBytes((uint64_t{c.term_count} + 1) * c.receiver_count * sizeof(TexelRecord)), *e.batch,
-               d.batches[*e.batch].receiver_count);
+    for (const ExplainedProbe& probe : e.probes) {
+        const ProbePosition& p = d.probes.global.positions[probe.number];
+        fmt::print("probe {} at {:.2f},{:.2f},{:.2f}: {:.1f} % of the light; {}\n", probe.number, p.x_m, p.y_m, p.z_m,
+                   100 * static_cast<double>(probe.share), receiverText(d.probes.view(), probe.receiver));
+    }
 }
 
 // Those that light the place, the brightest first.
 std::vector<const ExplainedContribution*> byShare(const Explanation& e) {
     std::vector<const ExplainedContribution*> order;
     for (const ExplainedContribution& c : e.contributions)
-        if (c.stored || c.full_lux != std::array<float, 3>{}) order.push_back(&c);
+        if (c.records > 0 || c.full_lux != std::array<float, 3>{}) order.push_back(&c);
     std::ranges::stable_sort(order, [](auto* a, auto* b) { return a->share > b->share; });
     return order;
+}
+
+uint64_t baseBytes(const Explanation& e) {
+    return storedFor(e).record_bytes * (e.surface ? 1 : e.probes.size());
 }
 
 void printContributions(const PackData& d, const Explanation& e) {
     fmt::print("\n{:<40} {:>16} {:>26} {:>8} {:>6} {:>12} {:>10} {:>8}\n", "contribution", "weight", "lux (r g b)",
                "share", "bytes", "receivers", "in all", "dropped");
+    const Stored stored = storedFor(e);
     fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6}\n", "base", 1, luxText(e.base_lux), 100 * e.base_share,
-               sizeof(TexelRecord));
+               baseBytes(e));
     for (const ExplainedContribution* c : byShare(e)) {
         const Contribution& of = d.contributions[c->contribution];
         fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6} {:>12} {:>10} {:>6.2f} %\n", describe(d, of),
-                   weightText(c->weight), luxText(c->lux), 100 * c->share, c->stored ? sizeof(TexelRecord) : 0,
-                   of.receivers, humanBytes(bytesOf(of)), 100 * static_cast<double>(of.energy_dropped));
+                   weightText(c->weight), luxText(c->lux), 100 * c->share, c->records * stored.record_bytes,
+                   stored.receivers(d, c->contribution), humanBytes(stored.bytes(d, c->contribution)),
+                   100 * static_cast<double>(of.energy_dropped));
     }
-    fmt::print("{:<40} {:>16} {:>26}\n", "the pages", "", luxText(e.lux));
+    fmt::print("{:<40} {:>16} {:>26}\n", e.surface ? "the pages" : "the probes", "", luxText(e.lux));
 }
 
 // What is not stored at the place: it reaches it below the threshold, or not at all.
 void printAbsent(const PackData& d, const Explanation& e) {
     std::vector<std::string> absent;
     for (const ExplainedContribution& c : e.contributions)
-        if (!c.stored)
+        if (c.records == 0)
             absent.push_back(fmt::format("{} ({:.2f} %)", describe(d, d.contributions[c.contribution]),
                                          100 * static_cast<double>(d.contributions[c.contribution].energy_dropped)));
     if (absent.empty()) return;
     fmt::print(
-        "\nnot stored at the texel, being below the threshold there or no light at all (in brackets what the "
+        "\nnot stored at the {}, being below the threshold there or no light at all (in brackets what the "
         "threshold dropped in the whole level):\n  {}\n",
-        fmt::join(absent, "\n  "));
+        e.surface ? "texel" : "probes", fmt::join(absent, "\n  "));
+}
+
+void putReceiver(nlohmann::ordered_json& j, const ReceiverView& view, const ReceiverPlace& at) {
+    j["cluster"] = nullptr;
+    j["batch"] = nullptr;
+    if (!at.cluster) return;
+    const Cluster& c = view.clusters[*at.cluster];
+    j["cluster"] = {{"index", *at.cluster}, {"receivers", c.receiver_count}, {"contributions", c.term_count}};
+    j["batch"] = {{"index", *at.batch}, {"receivers", view.batches[*at.batch].receiver_count}};
 }
 
 nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const ExplainArguments& a) {
-    using Json = nlohmann::ordered_json;
-    const Mesh& mesh = d.meshes[e.surface.mesh];
-    const glm::vec3 n = e.surface.frame.normal;
-    Json j;
+    const Stored stored = storedFor(e);
+    nlohmann::ordered_json j;
     j["point"] = a.point;
     j["state"] = a.state;
-    j["place"] = {{"node", mesh.node},  {"page", mesh.page},         {"texel", e.texel},
-                  {"uv", e.surface.uv}, {"normal", {n.x, n.y, n.z}}, {"distance_m", e.surface.distance_m}};
-    j["cluster"] = nullptr;
-    j["batch"] = nullptr;
-    if (e.cluster) {
-        const Cluster& c = d.clusters[*e.cluster];
-        j["cluster"] = {{"index", *e.cluster}, {"receivers", c.receiver_count}, {"contributions", c.term_count}};
-        j["batch"] = {{"index", *e.batch}, {"receivers", d.batches[*e.batch].receiver_count}};
+    if (e.surface) {
+        const SurfacePlace& place = e.surface->place;
+        const Mesh& mesh = d.meshes[place.mesh];
+        const glm::vec3 n = place.frame.normal;
+        j["place"] = {{"node", mesh.node}, {"page", mesh.page},         {"texel", e.surface->texel},
+                      {"uv", place.uv},    {"normal", {n.x, n.y, n.z}}, {"distance_m", place.distance_m}};
+        putReceiver(j, d.texelView(), e.surface->receiver);
+    } else {
+        j["probes"] = nlohmann::ordered_json::array();
+        for (const ExplainedProbe& probe : e.probes) {
+            const ProbePosition& p = d.probes.global.positions[probe.number];
+            j["probes"].push_back(
+                {{"number", probe.number}, {"position_m", {p.x_m, p.y_m, p.z_m}}, {"share", probe.share}});
+            putReceiver(j["probes"].back(), d.probes.view(), probe.receiver);
+        }
     }
     j["lux"] = e.lux;
-    j["base"] = {{"lux", e.base_lux}, {"share", e.base_share}, {"bytes", sizeof(TexelRecord)}};
-    j["contributions"] = Json::array();
+    j["base"] = {{"lux", e.base_lux}, {"share", e.base_share}, {"bytes", baseBytes(e)}};
+    j["contributions"] = nlohmann::ordered_json::array();
     for (const ExplainedContribution& c : e.contributions) {
         const Contribution& of = d.contributions[c.contribution];
         j["contributions"].push_back({{"light", lightName(d, of)},
@@ -113,10 +152,10 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
                                       {"lux", c.lux},
                                       {"lux_at_weight_1", c.full_lux},
                                       {"share", c.share},
-                                      {"stored", c.stored},
-                                      {"bytes", c.stored ? sizeof(TexelRecord) : 0},
-                                      {"receivers_in_all", of.receivers},
-                                      {"bytes_in_all", bytesOf(of)},
+                                      {"stored", c.records > 0},
+                                      {"bytes", c.records * stored.record_bytes},
+                                      {"receivers_in_all", stored.receivers(d, c.contribution)},
+                                      {"bytes_in_all", stored.bytes(d, c.contribution)},
                                       {"energy_dropped", of.energy_dropped}});
     }
     return j;
@@ -135,7 +174,10 @@ int run(const ExplainArguments& a) {
         if (!(glm::length(n) > 1e-6f)) return reportError({ErrorCode::InvalidArgument, "--normal has no length"});
         normal = glm::normalize(n);
     }
-    const auto e = explain(*pack, {a.point[0], a.point[1], a.point[2]}, normal, a.state);
+    const ExplainFrom from = a.from == "surface" ? ExplainFrom::Surface
+                             : a.from == "grid"  ? ExplainFrom::Grid
+                                                 : ExplainFrom::Nearest;
+    const auto e = explain(*pack, {a.point[0], a.point[1], a.point[2]}, normal, a.state, from);
     if (!e) return reportError(e.error());
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(pack->data(), *e, a), a.json); !ok) return reportError(ok.error());
@@ -153,15 +195,19 @@ void addExplainCommand(CLI::App& app, int& exit_code) {
     auto* c = app.add_subcommand("explain", "What lights a place, and what that costs");
     c->add_option("PACK", a->pack, "a cooked pack")->required();
     c->add_option("--point", a->point,
-                  "x,y,z in metres, glTF axes; the nearest lightmapped surface within 10 cm counts")
+                  "x,y,z in metres, glTF axes; the nearest lightmapped surface within 10 cm counts, or, in the "
+                  "air, the global grid's probes around")
         ->required()
         ->delimiter(',')
         ->expected(3);
     c->add_option("--normal", a->normal,
                   "x,y,z: light on this normal, from a surface that faces along it; default: the "
-                  "surface's own")
+                  "surface's own; in the air the mean over all")
         ->delimiter(',')
         ->expected(3);
+    c->add_option("--from", a->from,
+                  "surface or grid, whatever is near; default: a surface within 10 cm, else the grid")
+        ->check(CLI::IsMember({"surface", "grid"}));
     c->add_option("--state", a->state,
                   "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (or their "
                   "maximum), doors 0");
@@ -169,7 +215,8 @@ void addExplainCommand(CLI::App& app, int& exit_code) {
     c->footer(
         "Irradiance in lux of every contribution at its weight, its share of the luminance, the bytes of its record "
         "at\n"
-        "the texel, its receivers and bytes in the whole level, and the share of its energy that the threshold\n"
+        "the texel or the probes around, its receivers and bytes in the whole level, and the share of its energy that "
+        "the threshold\n"
         "dropped there. Neighbouring texels take part by filtering, as in a shader.\n"
         "Example: dimmer explain house.dimmer --point 3,0,3 --state \"alarm=0.5,door:front=1\"");
     c->callback([a, &exit_code] { exit_code = run(*a); });

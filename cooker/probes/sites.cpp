@@ -19,7 +19,7 @@ constexpr double density_max_per_m3 = 1;
 // Small levels can have more sites, and need them, as single probes matter; large ones cannot pay for all that are
 // asked.
 constexpr double small_sites_per_probe = 40, small_sites = 4000;
-constexpr double many_sites = 60000, sites_per_probe_min = 3;
+constexpr double many_sites = 60000, sites_per_probe_min = 5;
 constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
 constexpr uint32_t tries_per_site = 16;
 // Half of the places are near a lamp, where light changes over a hand's breadth: nearer than this many times the

@@ -4,6 +4,10 @@
 #include <pipeline/explain.h>
 
 #include <pack/sample_pack.h>
+#include <probes/tetrahedra.h>
+
+#include <cmath>
+#include <numbers>
 
 namespace dimmer::cook {
 namespace {
@@ -12,8 +16,12 @@ using testing::HasSubstr;
 
 constexpr uint32_t side = 8;
 
+uint32_t evenLight(float light) {
+    return encodeR11G11B10(light, light, light);
+}
+
 TexelRecord even(float lux) {
-    return {encodeR11G11B10(lux, lux, lux), direction_none};
+    return {evenLight(lux), direction_none};
 }
 
 // A floor of 8 x 8 m, one texel per metre, u along +x and v along +z. Everywhere: base 8 lux, set "hall" 64 lux; where
@@ -58,12 +66,12 @@ Pack halvesPack() {
 TEST(Explain, NamesTheTexelItsClusterAndItsBatch) {
     const auto e = explain(halvesPack(), {6.5f, 0.05f, 2.5f}, {}, "");
     ASSERT_TRUE(e) << e.error().message;
-    EXPECT_EQ(e->surface.mesh, 0u);
-    EXPECT_NEAR(e->surface.distance_m, 0.05f, 1e-6f);
-    EXPECT_EQ(e->texel, (std::array<uint32_t, 2>{6, 2}));
-    EXPECT_EQ(e->cluster, 1u);
-    EXPECT_EQ(e->batch, 1u);
-    EXPECT_EQ(explain(halvesPack(), {0.5f, 0, 7.5f}, {}, "")->cluster, 0u);
+    EXPECT_EQ(e->surface->place.mesh, 0u);
+    EXPECT_NEAR(e->surface->place.distance_m, 0.05f, 1e-6f);
+    EXPECT_EQ(e->surface->texel, (std::array<uint32_t, 2>{6, 2}));
+    EXPECT_EQ(e->surface->receiver.cluster, 1u);
+    EXPECT_EQ(e->surface->receiver.batch, 1u);
+    EXPECT_EQ(explain(halvesPack(), {0.5f, 0, 7.5f}, {}, "")->surface->receiver.cluster, 0u);
 }
 
 TEST(Explain, EveryContributionWithItsWeightAndShare) {
@@ -73,7 +81,7 @@ TEST(Explain, EveryContributionWithItsWeightAndShare) {
     const auto& [hall, lamp] = std::tie(e->contributions[0], e->contributions[1]);
     EXPECT_EQ(hall.weight, Weight(0.5f));
     EXPECT_EQ(lamp.weight, Weight(2 * 0.25f));
-    EXPECT_TRUE(hall.stored && lamp.stored);
+    EXPECT_TRUE(hall.records == 1 && lamp.records == 1);
     // 8 + 0.5 * 64 + 0.5 * 32 = 56 lux; sums in the format of 7 bits hold it exactly (56 = 1.75 * 32).
     for (const size_t c : {0u, 1u, 2u}) {
         EXPECT_FLOAT_EQ(e->base_lux[c], 8);
@@ -102,7 +110,7 @@ TEST(Explain, NeighboursTakePartByFiltering) {
     const auto e = explain(halvesPack(), {3.99f, 0, 2.5f}, {}, "door:front=1");
     ASSERT_TRUE(e) << e.error().message;
     const ExplainedContribution& lamp = e->contributions[1];
-    EXPECT_FALSE(lamp.stored);
+    EXPECT_EQ(lamp.records, 0u);
     EXPECT_NEAR(lamp.full_lux[0], 0.49f * 32, 1e-3f);
     // In the left half there is none of it.
     EXPECT_EQ(explain(halvesPack(), {1.5f, 0, 2.5f}, {}, "door:front=1")->contributions[1].full_lux,
@@ -122,7 +130,7 @@ TEST(Explain, TexelsThatNeverChangeHaveNoCluster) {
     ASSERT_TRUE(pack) << pack.error().message;
     const auto e = explain(*pack, {1.5f, 0, 2.5f}, {}, "");
     ASSERT_TRUE(e) << e.error().message;
-    EXPECT_FALSE(e->cluster || e->batch);
+    EXPECT_FALSE(e->surface->receiver.cluster || e->surface->receiver.batch);
     EXPECT_DOUBLE_EQ(e->base_share, 1);
 }
 
@@ -148,7 +156,7 @@ TEST(Explain, PartsAddUpToThePages) {
         const auto centre = [](int texel) { return ((static_cast<float>(texel) + 0.5f) / 32 - 0.1f) / 0.5f; };
         const auto e = explain(*pack, {centre(4 + i % 8), 0, centre(5 + i / 2)}, {}, "door:door0=0.5,set0=2");
         ASSERT_TRUE(e) << e.error().message;
-        clustered += e->cluster.has_value();
+        clustered += e->surface->receiver.cluster.has_value();
         for (const size_t c : {0u, 1u, 2u}) {
             float sum = e->base_lux[c];
             for (const ExplainedContribution& part : e->contributions) sum += part.lux[c];
@@ -157,6 +165,79 @@ TEST(Explain, PartsAddUpToThePages) {
         }
     }
     EXPECT_GT(clustered, 4u);
+}
+
+// The floor again, 3 m below the probes of a tetrahedron that stands on (0, 3, 0) and reaches 1 m along each axis (a
+// grid around it gives every place an answer). Radiance is even all around: base 1 cd/m2 at all probes, "hall" 4 cd/m2
+// at those of x = 0, so E = pi L.
+PackData withProbes() {
+    PackData d = halves();
+    const std::vector<glm::vec3> corners = {{0, 3, 0}, {1, 3, 0}, {0, 4, 0}, {0, 3, 1}};
+    const auto built = tetrahedralise(corners, {{-1, 2, -1}, {2, 5, 2}});
+    EXPECT_TRUE(built);
+    d.probes.global = *built;
+    const float y00 = std::sqrt(4 * std::numbers::pi_v<float>);
+    const auto evenly = [&](float radiance) {
+        ProbeRecord record;
+        record.light = evenLight(radiance * y00);
+        return record;
+    };
+    d.exposure = 1;
+    for (const ProbePosition& p : built->positions) {
+        d.probes.base.push_back(evenly(1));
+        if (p.x_m == 0 && p.y_m > 2.5f && p.y_m < 4.5f)
+            d.probes.numbers.push_back(static_cast<uint32_t>(d.probes.base.size() - 1));
+    }
+    const auto receivers = static_cast<uint32_t>(d.probes.numbers.size());
+    EXPECT_EQ(receivers, 3u);
+    d.probes.clusters = {{0, receivers, 0, 1, 0, 1}};
+    d.probes.terms = {{0, 0}};
+    d.probes.batches = {{0, receivers}};
+    d.probes.payload.assign(receivers, evenly(4));
+    d.probes.record_counts = {receivers, 0};
+    return d;
+}
+
+TEST(Explain, InTheAirTheProbesAround) {
+    const auto pack = Pack::fromData(withProbes());
+    ASSERT_TRUE(pack) << pack.error().message;
+    constexpr float pi = std::numbers::pi_v<float>;
+    // R11G11B10 has 6 bits: half a step is 1 / 128, once for the record, once for the blend (blue: twice that).
+    constexpr float quantum = 1.0f / 64;
+    for (const std::optional<glm::vec3> normal :
+         {std::optional<glm::vec3>{}, std::optional(glm::vec3(0, 0.6f, 0.8f))}) {
+        const auto e = explain(*pack, {0.5f, 3.25f, 0.125f}, normal, "hall=0.5");
+        ASSERT_TRUE(e) << e.error().message;
+        EXPECT_FALSE(e->surface);
+        // Barycentric: 1/2 at (1, 3, 0), 1/4 at (0, 4, 0), 1/8 at the two others.
+        ASSERT_EQ(e->probes.size(), 4u);
+        float shares = 0;
+        for (const ExplainedProbe& probe : e->probes) {
+            const ProbePosition& p = pack->data().probes.global.positions[probe.number];
+            EXPECT_NEAR(probe.share, p.x_m == 1 ? 0.5f : p.y_m == 4 ? 0.25f : 0.125f, 1e-5f);
+            EXPECT_EQ(probe.receiver.cluster.has_value(), p.x_m == 0);
+            shares += probe.share;
+        }
+        EXPECT_NEAR(shares, 1, 1e-5f);
+        ASSERT_EQ(e->contributions.size(), 2u);
+        const ExplainedContribution& hall = e->contributions[0];
+        EXPECT_EQ(hall.records, 3u);
+        EXPECT_EQ(e->contributions[1].records, 0u);
+        EXPECT_EQ(e->contributions[1].full_lux, (std::array<float, 3>{}));
+        EXPECT_NEAR(e->base_lux[0], pi, quantum * pi);
+        EXPECT_NEAR(hall.full_lux[0], 0.5f * 4 * pi, quantum * 2 * pi);
+        EXPECT_NEAR(hall.lux[0], pi, quantum * pi);
+        EXPECT_NEAR(e->lux[0], 2 * pi, 2 * quantum * pi);
+        EXPECT_NEAR(hall.share, 0.5, 0.01);
+    }
+    // A surface near by comes first, unless the grid is asked for.
+    EXPECT_TRUE(explain(*pack, {4, 0.05f, 4}, {}, "")->surface);
+    EXPECT_FALSE(explain(*pack, {4, 0.05f, 4}, {}, "", ExplainFrom::Grid)->surface);
+    EXPECT_FALSE(explain(*pack, {4, 1.5f, 4}, {}, "", ExplainFrom::Surface));
+    const auto none = explain(halvesPack(), {4, 1.5f, 4}, {}, "", ExplainFrom::Grid);
+    ASSERT_FALSE(none);
+    EXPECT_THAT(none.error().message, HasSubstr("grids.global=on"));
+    EXPECT_THAT(explain(halvesPack(), {4, 1.5f, 4}, {}, "").error().message, HasSubstr("no global grid"));
 }
 
 }  // namespace
