@@ -21,31 +21,38 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
     const RayScene& rays = gatherer.rays();
     const DoorPaths& paths = gatherer.paths();
     const auto points = static_cast<uint32_t>(from.points.size());
-    const glm::vec3 place = from.points[0].position_m;
     uint64_t traced = 0;
+    const auto addLight = [&](const PunctualLight& light, const SamplePoint& p, float share) {
+        const Illumination lit = illuminate(light, p.position_m);
+        const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
+        const float weight = Light::Intake::weight(direction);
+        if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) return;
+        ++traced;
+        const float distance_m = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
+        forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
+                   [&](float passed, uint32_t path) {
+                       const uint32_t term = paths.term(groupOf(light.light_set), path);
+                       if (term == no_term) return;
+                       const glm::vec3 lux = lit.irradiance_lux * (weight * passed * share);
+                       const auto weights = Light::weightsOf(direction);
+                       reflected[term].add(lux, weights);
+                       if (light.bake == BakeMode::Full) stored[term].add(lux, weights);
+                   });
+    };
+    const std::vector<PunctualLight>& lights = rays.scene().lights;
+    if (from.wide) {
+        for (const SamplePoint& p : from.points)
+            grid.forEach(p.position_m, [&](uint32_t l) { addLight(lights[l], p, 1 / static_cast<float>(points)); });
+        return traced;
+    }
+    const glm::vec3 place = from.points[0].position_m;
     grid.forEach(place, [&](uint32_t l) {
-        const PunctualLight& light = rays.scene().lights[l];
+        const PunctualLight& light = lights[l];
         const uint32_t first = hash(grid.identity(l), from.id) % points;
         const bool near = light.type == LightType::Directional || glm::distance(light.position_m, place) < near_m;
         const uint32_t used = near ? points : 1;
-        for (uint32_t i = 0; i < used; ++i) {
-            const SamplePoint& p = from.points[(first + i) % points];
-            const Illumination lit = illuminate(light, p.position_m);
-            const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
-            const float weight = Light::Intake::weight(direction);
-            if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) continue;
-            ++traced;
-            const float distance_m = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
-            forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
-                       [&](float passed, uint32_t path) {
-                           const uint32_t term = paths.term(groupOf(light.light_set), path);
-                           if (term == no_term) return;
-                           const glm::vec3 lux = lit.irradiance_lux * (weight * passed / static_cast<float>(used));
-                           const auto weights = Light::weightsOf(direction);
-                           reflected[term].add(lux, weights);
-                           if (light.bake == BakeMode::Full) stored[term].add(lux, weights);
-                       });
-        }
+        for (uint32_t i = 0; i < used; ++i)
+            addLight(light, from.points[(first + i) % points], 1 / static_cast<float>(used));
     });
     return traced;
 }

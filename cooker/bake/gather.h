@@ -131,6 +131,7 @@ struct GatherFrom {
     uint32_t id = 0;
     uint32_t condition = no_condition;  // under which the receiver is there: a leaf's
     uint32_t ignored = no_model;        // a model that its rays pass through
+    bool wide = false;                  // points may lie metres apart: not all get the same lights
 };
 
 // What the rays of a gather found, for going there again.
@@ -185,7 +186,7 @@ class Gatherer {
     GatherFrom at(size_t receiver) const {
         if (receiver >= texels_.size()) {
             const size_t i = receiver - texels_.size();
-            return {models_.points(i), static_cast<uint32_t>(receiver), no_condition, models_.model(i)};
+            return {models_.points(i), static_cast<uint32_t>(receiver), no_condition, models_.model(i), true};
         }
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
                 static_cast<uint32_t>(receiver),

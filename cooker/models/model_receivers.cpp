@@ -16,8 +16,10 @@ namespace {
 // Probes stand on the floor that a model stands on: shares of the way to the model's middle that are tried.
 constexpr std::array<float, 7> ways_in = {0.03f, 0.06f, 0.1f, 0.18f, 0.3f, 0.45f, 0.6f};
 constexpr float clearance_m = 0.02f;
-constexpr uint32_t points_per_triangle = 16;
-constexpr size_t points_per_receiver = 8;
+// Points of a model's surface: so many to a triangle at least, and one to each quarter of the probes' spacing, squared.
+constexpr uint32_t points_per_triangle = 16, points_per_triangle_max = 4096;
+constexpr float spacings_per_point = 0.25f;
+constexpr size_t points_per_receiver = 16;
 constexpr float lift_m = 1e-3f;
 
 struct NearNormals {
@@ -87,50 +89,69 @@ uint32_t drawn(const std::array<uint32_t, count>& from, const std::array<float, 
     return from[count - 1];
 }
 
+float areaPerPoint(const SceneModel& model) {
+    const glm::vec3 spacing = (model.max_m - model.min_m) / glm::vec3(model.probes - 1u);
+    const float side = spacings_per_point * std::max({spacing.x, spacing.y, spacing.z});
+    return side * side;
+}
+
 // visit(point, normal, area, reflectance) for points spread over a model's lit sides.
 void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
     const Scene& scene = rays.scene();
+    const float area_per_point = areaPerPoint(scene.models[model]);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const LevelTriangle& triangle = rays.triangles()[t];
         if (scene.meshes[triangle.mesh].model != model) continue;
         const Material& material = scene.materials[triangle.material];
         const glm::vec3 a = rays.corner(t, 0);
         const float area = 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
-        for (uint32_t i = 0; i < points_per_triangle; ++i) {
+        const float by_area =
+            std::ceil(std::min(area / std::max(area_per_point, 1e-12f), float{points_per_triangle_max}));
+        const uint32_t points = std::max(points_per_triangle, static_cast<uint32_t>(by_area));
+        for (uint32_t i = 0; i < points; ++i) {
             const glm::vec2 square = sequence2d(i, t);
             const float root = std::sqrt(square.x), u = root * (1 - square.y), v = root * square.y;
             const glm::vec3 rho = material.reflectance(glm::vec3(rays.surfaceColor(t, u, v)));
-            visit(rays.pointOn(t, u, v), triangle.normal, area / points_per_triangle, rho);
-            if (material.double_sided) visit(rays.pointOn(t, u, v), -triangle.normal, area / points_per_triangle, rho);
+            visit(rays.pointOn(t, u, v), triangle.normal, area / static_cast<float>(points), rho);
+            if (material.double_sided)
+                visit(rays.pointOn(t, u, v), -triangle.normal, area / static_cast<float>(points), rho);
         }
     }
 }
 
-// Of the points of a surface that count for a receiver, some that are in the open, drawn without replacement, by weight
-// (Efraimidis and Spirakis 2006). A surface may lie in other geometry for the most part: some more are kept.
+// Of the points of a surface that count for a receiver, some are drawn without replacement, by weight (Efraimidis and
+// Spirakis 2006). A surface may lie in other geometry for the most part: more are kept than are needed.
 class DrawnPoints {
    public:
-    void offer(glm::vec3 point_m, float weight, uint32_t chance) {
+    void offer(uint32_t point, float weight, uint32_t chance) {
         if (!(weight > 0)) return;
-        drawn_.emplace_back(-std::log(1 - unitFloat(chance)) / weight, point_m);
+        drawn_.emplace_back(-std::log(1 - unitFloat(chance)) / weight, point);
         if (drawn_.size() >= 2 * kept) prune();
     }
-    std::vector<glm::vec3> inOpen(const RayScene& rays, uint32_t model) {
-        prune();
-        std::vector<glm::vec3> points;
-        for (const auto& [order, point] : drawn_)
-            if (points.size() < points_per_receiver && inTheOpen(rays, point, model, 0)) points.push_back(point);
-        return points;
+    void prune() {
+        std::ranges::sort(drawn_);
+        drawn_.resize(std::min(drawn_.size(), kept));
     }
+    // Ascending in order of the draw, with numbers of points.
+    std::span<const std::pair<float, uint32_t>> drawn() const { return drawn_; }
 
    private:
     static constexpr size_t kept = 4 * points_per_receiver;
-    void prune() {
-        std::ranges::sort(drawn_, {}, &std::pair<float, glm::vec3>::first);
-        drawn_.resize(std::min(drawn_.size(), kept));
-    }
-    std::vector<std::pair<float, glm::vec3>> drawn_;
+    std::vector<std::pair<float, uint32_t>> drawn_;
 };
+
+// Per point, whether it is in the open; asked for those that were drawn.
+std::vector<uint8_t> openAmong(const RayScene& rays, uint32_t model, std::span<const glm::vec3> points,
+                               std::span<DrawnPoints> drawn) {
+    std::vector<uint8_t> asked(points.size()), open(points.size());
+    for (DrawnPoints& d : drawn) {
+        d.prune();
+        for (const auto& [order, point] : d.drawn()) asked[point] = 1;
+    }
+    tbb::parallel_for(size_t{0}, points.size(),
+                      [&](size_t i) { open[i] = asked[i] && inTheOpen(rays, points[i], model, 0); });
+    return open;
+}
 
 }  // namespace
 
@@ -205,11 +226,12 @@ void ModelReceivers::makeReceivers(uint32_t index) {
     area_m2_.resize(first + count);
     model_.resize(first + count, index);
     std::vector<DrawnPoints> drawn(count);
-    uint32_t number = 0;
+    std::vector<glm::vec3> surface;
     forSurface(rays_, index, [&](glm::vec3 point, glm::vec3 normal, float area, glm::vec3) {
         const NearNormals normals = nearNormals(normal);
         const NearProbes near = nearProbes(scene_model, point);
-        ++number;
+        const auto number = static_cast<uint32_t>(surface.size());
+        surface.push_back(point + lift_m * normal);
         for (size_t n = 0; n < 3; ++n)
             for (size_t k = 0; k < 8; ++k) {
                 const uint32_t source = places_.source[model.first_probe + near.number[k]];
@@ -218,18 +240,20 @@ void ModelReceivers::makeReceivers(uint32_t index) {
                 const uint32_t receiver = (source - model.first_probe) * model.slot_count + slot;
                 const float share = area * normals.share[n] * near.share[k];
                 area_m2_[first + receiver] += share;
-                drawn[receiver].offer(point + lift_m * normal, share, hash(number, receiver));
+                drawn[receiver].offer(number, share, hash(number, receiver));
             }
     });
-    std::vector<std::vector<glm::vec3>> places(count);
-    tbb::parallel_for(size_t{0}, count, [&](size_t i) { places[i] = drawn[i].inOpen(rays_, index); });
+    const std::vector<uint8_t> open = openAmong(rays_, index, surface, drawn);
     for (uint32_t p = 0; p < probes; ++p)
         for (uint32_t s = 0; s < model.slot_count; ++s) {
             const auto normal = static_cast<uint32_t>(std::ranges::find(model.slots, s) - model.slots.begin());
-            auto& at = places[size_t{p} * model.slot_count + s];
-            if (at.empty()) at.push_back(places_.position_m[model.first_probe + p]);
-            first_point_.push_back(static_cast<uint32_t>(points_.size()));
-            for (const glm::vec3 point_m : at) points_.push_back({point_m, first_receiver_face + normal});
+            const size_t first_point = points_.size();
+            first_point_.push_back(static_cast<uint32_t>(first_point));
+            for (const auto& [order, point] : drawn[size_t{p} * model.slot_count + s].drawn())
+                if (open[point] && points_.size() < first_point + points_per_receiver)
+                    points_.push_back({surface[point], first_receiver_face + normal});
+            if (points_.size() == first_point)
+                points_.push_back({places_.position_m[model.first_probe + p], first_receiver_face + normal});
         }
 }
 

@@ -19,13 +19,14 @@ constexpr double density_max_per_m3 = 1;
 // Small levels can have more sites, and need them, as single probes matter; large ones cannot pay for all that are
 // asked.
 constexpr double small_sites_per_probe = 40, small_sites = 4000;
-constexpr double many_sites = 60000, sites_per_probe_min = 5;
+constexpr double many_sites = 60000, sites_per_probe_affordable = 5;
 constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
 constexpr uint32_t tries_per_site = 16;
 // Half of the places are near a lamp, where light changes over a hand's breadth: nearer than this many times the
 // spacing of the others, so that what lies around that is not left to chance.
 constexpr double share_near_lamps = 0.5;
 constexpr double lamp_reach_spacings = 2.2;
+constexpr float lamp_reach_min_m = 0.8f;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
 constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
@@ -74,10 +75,10 @@ class Chooser {
                                                   static_cast<double>(settings_.probes_max)));
         out_.probes_max = static_cast<size_t>(probes);
         const double least = std::min(small_sites_per_probe * probes, small_sites);
-        const double most = std::max(many_sites, sites_per_probe_min * probes);
+        const double most = std::max(many_sites, sites_per_probe_affordable * probes);
         const double wanted = std::clamp(settings_.sites * probes, least, most);
         const double spacing_m = std::cbrt(out_.free_volume_m3 / ((1 - share_near_lamps) * wanted));
-        lamp_reach_m_ = static_cast<float>(lamp_reach_spacings * spacing_m);
+        lamp_reach_m_ = std::max(lamp_reach_min_m, static_cast<float>(lamp_reach_spacings * spacing_m));
         return static_cast<uint32_t>(wanted);
     }
 

@@ -14,8 +14,8 @@
 namespace dimmer::cook {
 
 struct SiteChoice {
-    // All over the level; around each lamp; the free ones of the corners of the grid's box. A block depends on geometry
-    // and its own lamp alone. Empty: nothing is free.
+    // All over the level; around each lamp; the free ones of the corners of the grid's box. A block depends on
+    // geometry, its own lamp and the settings alone. Empty: nothing is free.
     std::vector<SiteBlock> blocks;
     std::vector<bool> corner_free;  // which of the box's 8 corners the last block has
     size_t probes_max = 0;          // as the settings and the level's size have it
