@@ -51,7 +51,17 @@ std::string receiverText(const ReceiverView& view, const ReceiverPlace& at) {
                        view.batches[*at.batch].receiver_count);
 }
 
-void printPlace(const PackData& d, const Explanation& e) {
+// Of a point from the grid's box: there the light is that of the box's nearest point.
+float outsideOf(const StartGrid& box, const std::vector<float>& point) {
+    float squared = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        const float beyond = std::max({box.min_m[i] - point[i], point[i] - box.max_m[i], 0.0f});
+        squared += beyond * beyond;
+    }
+    return std::sqrt(squared);
+}
+
+void printPlace(const PackData& d, const Explanation& e, const ExplainArguments& a) {
     if (e.surface) {
         const SurfacePlace& place = e.surface->place;
         const Mesh& mesh = d.meshes[place.mesh];
@@ -60,6 +70,11 @@ void printPlace(const PackData& d, const Explanation& e) {
                    mesh.page, e.surface->texel[0], e.surface->texel[1], 100 * static_cast<double>(place.distance_m),
                    n.x, n.y, n.z, receiverText(d.texelView(), e.surface->receiver));
     }
+    if (e.surface) return;
+    fmt::print("in the air: {}\n", a.normal.empty() ? "the mean of the irradiance over all normals"
+                                                    : fmt::format("irradiance on {}", fmt::join(a.normal, ",")));
+    if (const float outside_m = outsideOf(d.probes.global.start, a.point); outside_m > 0)
+        fmt::print("{:.4g} m outside of the level; it gets the light of the nearest place inside\n", outside_m);
     for (const ExplainedProbe& probe : e.probes) {
         const ProbePosition& p = d.probes.global.positions[probe.number];
         fmt::print("probe {} at {:.2f},{:.2f},{:.2f}: {:.1f} % of the light; {}\n", probe.number, p.x_m, p.y_m, p.z_m,
@@ -106,7 +121,7 @@ void printAbsent(const PackData& d, const Explanation& e) {
     if (absent.empty()) return;
     fmt::print(
         "\nnot stored at the {}, being below the threshold there or no light at all (in brackets what the "
-        "threshold dropped in the whole level):\n  {}\n",
+        "threshold dropped on all surfaces):\n  {}\n",
         e.surface ? "texel" : "probes", fmt::join(absent, "\n  "));
 }
 
@@ -124,6 +139,8 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
     nlohmann::ordered_json j;
     j["point"] = a.point;
     j["state"] = a.state;
+    j["from"] = e.surface ? "surface" : "grid";
+    j["normal"] = a.normal.empty() ? nlohmann::ordered_json(nullptr) : nlohmann::ordered_json(a.normal);
     if (e.surface) {
         const SurfacePlace& place = e.surface->place;
         const Mesh& mesh = d.meshes[place.mesh];
@@ -132,6 +149,7 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
                       {"uv", place.uv},    {"normal", {n.x, n.y, n.z}}, {"distance_m", place.distance_m}};
         putReceiver(j, d.texelView(), e.surface->receiver);
     } else {
+        j["outside_m"] = outsideOf(d.probes.global.start, a.point);
         j["probes"] = nlohmann::ordered_json::array();
         for (const ExplainedProbe& probe : e.probes) {
             const ProbePosition& p = d.probes.global.positions[probe.number];
@@ -170,9 +188,9 @@ int run(const ExplainArguments& a) {
         return reportError({ErrorCode::InvalidArgument, "--point and --normal take three finite numbers each"});
     std::optional<glm::vec3> normal;
     if (!a.normal.empty()) {
-        const glm::vec3 n(a.normal[0], a.normal[1], a.normal[2]);
-        if (!(glm::length(n) > 1e-6f)) return reportError({ErrorCode::InvalidArgument, "--normal has no length"});
-        normal = glm::normalize(n);
+        const glm::dvec3 n(a.normal[0], a.normal[1], a.normal[2]);  // whose squares do not overflow
+        if (!(glm::length(n) > 0)) return reportError({ErrorCode::InvalidArgument, "--normal has no length"});
+        normal = glm::vec3(glm::normalize(n));
     }
     const ExplainFrom from = a.from == "surface" ? ExplainFrom::Surface
                              : a.from == "grid"  ? ExplainFrom::Grid
@@ -182,7 +200,7 @@ int run(const ExplainArguments& a) {
     if (!a.json.empty())
         if (auto ok = writeJson(toJson(pack->data(), *e, a), a.json); !ok) return reportError(ok.error());
     if (a.json == "-") return exit_done;
-    printPlace(pack->data(), *e);
+    printPlace(pack->data(), *e, a);
     printContributions(pack->data(), *e);
     printAbsent(pack->data(), *e);
     return exit_done;
@@ -217,7 +235,7 @@ void addExplainCommand(CLI::App& app, int& exit_code) {
         "at\n"
         "the texel or the probes around, its receivers and bytes in the whole level, and the share of its energy that "
         "the threshold\n"
-        "dropped there. Neighbouring texels take part by filtering, as in a shader.\n"
+        "dropped on surfaces. Neighbouring texels take part by filtering, as in a shader.\n"
         "Example: dimmer explain house.dimmer --point 3,0,3 --state \"alarm=0.5,door:front=1\"");
     c->callback([a, &exit_code] { exit_code = run(*a); });
 }

@@ -1,6 +1,6 @@
-// Models with light grids as the bounces see them: for each probe a few receivers, one for each of 18 normals spread over
-// the sphere. Each stands for what of the surface is near to its probe and normal; its light is gathered there as that
-// of texels is, without the model itself. A ray that hits the model picks one of them.
+// Models with light grids as the bounces see them: for each probe a few receivers, one for each of 18 normals spread
+// over the sphere. Each stands for what of the surface is near to its probe and normal; its light is gathered there as
+// that of texels is, without the model itself. A ray that hits the model picks one of them.
 #pragma once
 
 #include <charts/texels.h>
