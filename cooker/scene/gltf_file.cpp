@@ -135,7 +135,10 @@ Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, const std::string&
 Expected<Bytes> readFile(const std::filesystem::path& path) {
     std::error_code problem;
     if (!std::filesystem::is_regular_file(path, problem))
-        return fail(ErrorCode::Io, fmt::format("{}: there is no such file. Check the path.", path.string()));
+        return fail(ErrorCode::Io,
+                    fmt::format("{}: {}. Check the path.", path.string(),
+                                std::filesystem::exists(path, problem) ? "is a folder, a pipe or a device, and no file"
+                                                                       : "there is no such file"));
     const uintmax_t size = std::filesystem::file_size(path, problem);
     if (problem) return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
     if (size > file_bytes_max)

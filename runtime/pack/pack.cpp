@@ -33,8 +33,9 @@ Expected<Pack> Pack::fromBytes(std::span<const std::byte> bytes, std::string_vie
 Expected<Pack> Pack::open(const std::filesystem::path& path) {
     std::error_code error;
     const auto size = std::filesystem::file_size(path, error);
-    std::ifstream file(path, std::ios::binary);
-    if (error || !file)
+    std::ifstream file;
+    if (!error) file.open(path, std::ios::binary);  // a pipe, which has no size, would block
+    if (!file.is_open())
         return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(),
                                                error ? error.message() : "no permission to read"));
     std::vector<std::byte> bytes;

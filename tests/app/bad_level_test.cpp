@@ -6,6 +6,8 @@
 #include <functional>
 #include <limits>
 
+#include <sys/stat.h>
+
 namespace dimmer::test {
 namespace {
 
@@ -64,6 +66,20 @@ TEST_F(Cooks, RefusesFilesThatCannotBeRead) {
     const auto missing = cook("bad.dimmer", {}, "none.gltf");
     EXPECT_EQ(missing.exit_code, 2);
     EXPECT_THAT(missing.err, HasSubstr("none.gltf: there is no such file. Check the path."));
+}
+
+// A pipe has no end to wait for.
+TEST_F(Cooks, RefusesPipesAndDevices) {
+    const std::string pipe = file("pipe");
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    for (const std::string& level : {pipe, std::string("/dev/zero")}) {
+        const auto cooked = runDimmer({"cook", level, "-o", file("out.dimmer")});
+        EXPECT_EQ(cooked.exit_code, 2);
+        EXPECT_THAT(cooked.err, HasSubstr(level + ": is a folder, a pipe or a device, and no file"));
+        const auto inspected = runDimmer({"inspect", level});
+        EXPECT_EQ(inspected.exit_code, 2);
+        EXPECT_THAT(inspected.err, HasSubstr("the pack cannot be opened"));
+    }
 }
 
 TEST_F(Cooks, RefusesWhatCannotBeUsed) {
