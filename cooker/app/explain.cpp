@@ -20,18 +20,13 @@ struct ExplainArguments {
     std::vector<float> point, normal;
 };
 
-// Of the receivers that light a place.
-struct Stored {
-    uint32_t record_bytes;
-    uint64_t receivers(const PackData& d, uint32_t contribution) const {
-        if (record_bytes == sizeof(TexelRecord)) return d.contributions[contribution].receivers;
-        return d.probes.record_counts.empty() ? 0 : d.probes.record_counts[contribution];
-    }
-    uint64_t bytes(const PackData& d, uint32_t contribution) const { return receivers(d, contribution) * record_bytes; }
-};
-
-Stored storedFor(const Explanation& e) {
-    return {static_cast<uint32_t>(e.surface ? sizeof(TexelRecord) : sizeof(ProbeRecord))};
+// Of the receivers that light the place: texels or probes.
+size_t recordBytes(const Explanation& e) {
+    return e.surface ? sizeof(TexelRecord) : sizeof(ProbeRecord);
+}
+uint64_t receiversInAll(const PackData& d, const Explanation& e, uint32_t contribution) {
+    if (e.surface) return d.contributions[contribution].receivers;
+    return d.probes.record_counts.empty() ? 0 : d.probes.record_counts[contribution];
 }
 
 std::string weightText(const Weight& w) {
@@ -51,14 +46,12 @@ std::string receiverText(const ReceiverView& view, const ReceiverPlace& at) {
                        view.batches[*at.batch].receiver_count);
 }
 
-// Of a point from the grid's box: there the light is that of the box's nearest point.
-float outsideOf(const StartGrid& box, const std::vector<float>& point) {
-    float squared = 0;
-    for (size_t i = 0; i < 3; ++i) {
-        const float beyond = std::max({box.min_m[i] - point[i], point[i] - box.max_m[i], 0.0f});
-        squared += beyond * beyond;
-    }
-    return std::sqrt(squared);
+// Metres from a point to the grid's box: outside of it the light is that of the box's nearest point.
+double outsideOf(const StartGrid& box, const std::vector<float>& point) {
+    std::array<double, 3> beyond;  // whose squares do not overflow
+    for (size_t i = 0; i < 3; ++i)
+        beyond[i] = std::max({double{box.min_m[i]} - double{point[i]}, double{point[i]} - double{box.max_m[i]}, 0.0});
+    return std::hypot(beyond[0], beyond[1], beyond[2]);
 }
 
 void printPlace(const PackData& d, const Explanation& e, const ExplainArguments& a) {
@@ -69,11 +62,11 @@ void printPlace(const PackData& d, const Explanation& e, const ExplainArguments&
         fmt::print("{}: page {}, texel {}, {}; {:.1f} cm from the point, facing {:.2f},{:.2f},{:.2f}\n{}\n", mesh.node,
                    mesh.page, e.surface->texel[0], e.surface->texel[1], 100 * static_cast<double>(place.distance_m),
                    n.x, n.y, n.z, receiverText(d.texelView(), e.surface->receiver));
+        return;
     }
-    if (e.surface) return;
     fmt::print("in the air: {}\n", a.normal.empty() ? "the mean of the irradiance over all normals"
                                                     : fmt::format("irradiance on {}", fmt::join(a.normal, ",")));
-    if (const float outside_m = outsideOf(d.probes.global.start, a.point); outside_m > 0)
+    if (const double outside_m = outsideOf(d.probes.global.start, a.point); outside_m > 0)
         fmt::print("{:.4g} m outside of the level; it gets the light of the nearest place inside\n", outside_m);
     for (const ExplainedProbe& probe : e.probes) {
         const ProbePosition& p = d.probes.global.positions[probe.number];
@@ -92,21 +85,20 @@ std::vector<const ExplainedContribution*> byShare(const Explanation& e) {
 }
 
 uint64_t baseBytes(const Explanation& e) {
-    return storedFor(e).record_bytes * (e.surface ? 1 : e.probes.size());
+    return recordBytes(e) * (e.surface ? 1 : e.probes.size());
 }
 
 void printContributions(const PackData& d, const Explanation& e) {
     fmt::print("\n{:<40} {:>16} {:>26} {:>8} {:>6} {:>12} {:>10} {:>8}\n", "contribution", "weight", "lux (r g b)",
                "share", "bytes", "receivers", "in all", "dropped");
-    const Stored stored = storedFor(e);
     fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6}\n", "base", 1, luxText(e.base_lux), 100 * e.base_share,
                baseBytes(e));
     for (const ExplainedContribution* c : byShare(e)) {
         const Contribution& of = d.contributions[c->contribution];
+        const uint64_t in_all = receiversInAll(d, e, c->contribution);
         fmt::print("{:<40} {:>16} {:>26} {:>6.2f} % {:>6} {:>12} {:>10} {:>6.2f} %\n", describe(d, of),
-                   weightText(c->weight), luxText(c->lux), 100 * c->share, c->records * stored.record_bytes,
-                   stored.receivers(d, c->contribution), humanBytes(stored.bytes(d, c->contribution)),
-                   100 * static_cast<double>(of.energy_dropped));
+                   weightText(c->weight), luxText(c->lux), 100 * c->share, c->records * recordBytes(e), in_all,
+                   humanBytes(in_all * recordBytes(e)), 100 * static_cast<double>(of.energy_dropped));
     }
     fmt::print("{:<40} {:>16} {:>26}\n", e.surface ? "the pages" : "the probes", "", luxText(e.lux));
 }
@@ -135,7 +127,6 @@ void putReceiver(nlohmann::ordered_json& j, const ReceiverView& view, const Rece
 }
 
 nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const ExplainArguments& a) {
-    const Stored stored = storedFor(e);
     nlohmann::ordered_json j;
     j["point"] = a.point;
     j["state"] = a.state;
@@ -163,6 +154,7 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
     j["contributions"] = nlohmann::ordered_json::array();
     for (const ExplainedContribution& c : e.contributions) {
         const Contribution& of = d.contributions[c.contribution];
+        const uint64_t in_all = receiversInAll(d, e, c.contribution);
         j["contributions"].push_back({{"light", lightName(d, of)},
                                       {"doors_open", elementNames(d, of.doors_open)},
                                       {"doors_closed", elementNames(d, of.doors_closed)},
@@ -171,9 +163,9 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
                                       {"lux_at_weight_1", c.full_lux},
                                       {"share", c.share},
                                       {"stored", c.records > 0},
-                                      {"bytes", c.records * stored.record_bytes},
-                                      {"receivers_in_all", stored.receivers(d, c.contribution)},
-                                      {"bytes_in_all", stored.bytes(d, c.contribution)},
+                                      {"bytes", c.records * recordBytes(e)},
+                                      {"receivers_in_all", in_all},
+                                      {"bytes_in_all", in_all * recordBytes(e)},
                                       {"energy_dropped", of.energy_dropped}});
     }
     return j;

@@ -53,6 +53,39 @@ TEST_F(ExplainTool, TheLightIsThatOfSample) {
     EXPECT_NEAR(j["lux"][2].get<double>(), b, 1e-5 * b);
 }
 
+TEST_F(ExplainTool, InTheAirTheLightIsThatOfSampleFromGrid) {
+    const std::string grid = file("grid.dimmer");
+    ASSERT_EQ(runDimmer({"synth", "--like", "safehouse", "--scale", "0.015625", "--probes", "-o", grid}).exit_code, 0);
+    const auto sampled =
+        runDimmer({"sample", grid, "--points", "-", "--from", "grid"}, "x,y,z,nx,ny,nz\n1.5,1.2,2.5,0,0.6,-0.8\n");
+    ASSERT_EQ(sampled.exit_code, 0) << sampled.err;
+    const auto result = runDimmer(
+        {"explain", grid, "--point", "1.5,1.2,2.5", "--normal", "0,0.6,-0.8", "--from", "grid", "--json", "-"});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const json j = json::parse(result.out);
+    EXPECT_EQ(j["from"], "grid");
+    EXPECT_EQ(j["normal"].size(), 3u);
+    EXPECT_FALSE(j.contains("place"));
+    double probes = 0, share = j["base"]["share"];
+    for (const json& probe : j["probes"]) probes += probe["share"].get<double>();
+    for (const json& c : j["contributions"]) {
+        share += c["share"].get<double>();
+        EXPECT_EQ(c["bytes_in_all"], c["receivers_in_all"].get<uint64_t>() * 28);
+    }
+    EXPECT_NEAR(probes, 1, 1e-5);
+    EXPECT_NEAR(share, 1, 1e-6);
+    const std::string line = sampled.out.substr(sampled.out.find('\n') + 1);
+    double x = 0, r = 0, g = 0, b = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf,%lf", &x, &x, &x, &x, &x, &x, &r, &g, &b), 9);
+    EXPECT_GT(g, 0);
+    EXPECT_NEAR(j["lux"][1].get<double>(), g, 1e-5 * g);  // printed digits
+    // Far away: told, and no number is infinite.
+    const auto far = runDimmer({"explain", grid, "--point", "1e38,1e38,0", "--from", "grid", "--json", "-"});
+    const json f = json::parse(far.out);
+    EXPECT_NEAR(f["outside_m"].get<double>(), 1.414214e38, 1e33);
+    EXPECT_TRUE(f["normal"].is_null());
+}
+
 TEST_F(ExplainTool, WhatIsRefused) {
     const auto refused = [](const std::vector<std::string>& more, const std::string& message) {
         std::vector<std::string> arguments = {"explain", pack()};

@@ -168,8 +168,8 @@ TEST(Explain, PartsAddUpToThePages) {
 }
 
 // The floor again, 3 m below the probes of a tetrahedron that stands on (0, 3, 0) and reaches 1 m along each axis (a
-// grid around it gives every place an answer). Radiance is even all around: base 1 cd/m2 at all probes, "hall" 4 cd/m2
-// at those of x = 0, so E = pi L.
+// grid around it gives every place an answer). Radiance L is 1 cd/m2 on average at all probes, that of "hall" 4 cd/m2
+// at those of x = 0, and leans upwards, by the code q = 32 of Y_1-1: E = pi L (1 + 2 q / 127 n.y), and pi L on average.
 PackData withProbes() {
     PackData d = halves();
     const std::vector<glm::vec3> corners = {{0, 3, 0}, {1, 3, 0}, {0, 4, 0}, {0, 3, 1}};
@@ -177,7 +177,7 @@ PackData withProbes() {
     EXPECT_TRUE(built);
     d.probes.global = *built;
     const float y00 = std::sqrt(4 * std::numbers::pi_v<float>);
-    const auto evenly = [&](float radiance) {
+    const auto leaning = [&](float radiance) {
         ProbeRecord record;
         record.light = evenLight(radiance * y00);
         record.bands[0] = 0x202020;
@@ -185,7 +185,7 @@ PackData withProbes() {
     };
     d.exposure = 1;
     for (const ProbePosition& p : built->positions) {
-        d.probes.base.push_back(evenly(1));
+        d.probes.base.push_back(leaning(1));
         if (p.x_m == 0 && p.y_m > 2.5f && p.y_m < 4.5f)
             d.probes.numbers.push_back(static_cast<uint32_t>(d.probes.base.size() - 1));
     }
@@ -194,7 +194,7 @@ PackData withProbes() {
     d.probes.clusters = {{0, receivers, 0, 1, 0, 1}};
     d.probes.terms = {{0, 0}};
     d.probes.batches = {{0, receivers}};
-    d.probes.payload.assign(receivers, evenly(4));
+    d.probes.payload.assign(receivers, leaning(4));
     d.probes.record_counts = {receivers, 0};
     return d;
 }

@@ -15,14 +15,14 @@ TEST(FreeSpace, InsideOfARoomAndOutsideOfWhatStandsThere) {
     const RayScene rays(scene);
     EXPECT_TRUE(inTheOpen(rays, {0, 0, 0}));
     EXPECT_FALSE(inTheOpen(rays, {1, 0, 0}));  // in the pillar
-    EXPECT_FALSE(inTheOpen(rays, {3, 0, 0}));  // outside, where a pillar's height away nothing but backs is
+    EXPECT_FALSE(inTheOpen(rays, {3, 0, 0}));  // outside: nothing but backs
     EXPECT_FALSE(inTheOpen(rays, {0, 9, 0}));
     EXPECT_FALSE(inTheOpen(rays, {-1.98f, 0, 0}));  // 2 cm from a wall
     EXPECT_TRUE(inTheOpen(rays, {-1.98f, 0, 0}, no_model, 0.01f));
 }
 
-// Far outside most rays meet nothing. A screen that stands there is seen by one ray in a dozen, the room's backs by one
-// in ten: with 24 rays one place in a dozen meets the screen alone.
+// Far outside most rays meet nothing, some the room's backs, and fewer the front of a screen that stands there. By 24
+// rays alone 15 of these places would pass, as they happen to meet the screen and not the room.
 TEST(FreeSpace, NoPlaceOutsidePassesByLuck) {
     Scene scene;
     const uint32_t grey = addMaterial(scene, lambert(0.5f));
