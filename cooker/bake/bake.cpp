@@ -162,7 +162,7 @@ class Bake {
                 baked_.grid = std::move(*grid);
                 return;
             }
-        auto choice = chooseSites(rays_, settings_.grid);
+        auto choice = chooseSites(rays_, settings_.grid, store_);
         if (!choice) return warnOfNoGrid(choice.error());
         choice_ = std::move(*choice);
         sites_.emplace(choice_.blocks, paths_, store_);

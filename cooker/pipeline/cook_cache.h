@@ -46,8 +46,12 @@ class CookCache {
     // `parts`: of all groups, what the grid depends on.
     std::optional<BakedGrid> findGrid(const Key& key, const std::vector<std::string>& parts);
     void keepGrid(const Key& key, const BakedGrid& grid);
-    std::vector<SiteBlockLight> findSites(const std::string& what, const Key& key, std::span<const SiteBlock> blocks);
-    void keepSites(const Key& key, std::span<const SiteBlockLight> sites);
+    // `group`: its key.
+    std::vector<Sparse<ProbeTermLight>> findSites(const std::string& what, const Key& group,
+                                                  std::span<const SiteBlock> blocks);
+    void keepSites(const Key& key, const Sparse<ProbeTermLight>& light);
+    std::optional<std::vector<glm::vec3>> findPlaces(const Key& key);
+    void keepPlaces(const Key& key, std::span<const glm::vec3> places);
     std::optional<SparseLight> findRadiance(const Key& key);
     void keepRadiance(const Key& key, const SparseLight& radiance);
     // Where rays end.
@@ -86,9 +90,15 @@ class CachedGroups final : public GroupStore {
     void keep(uint32_t group, const GroupLight& light) override { cache_.keepGroup(keys_[group], light); }
     std::optional<BakedGrid> findGrid() override;
     void keepGrid(const BakedGrid& grid) override { cache_.keepGrid(grid_, grid); }
-    std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
-    void keepSites(uint32_t group, std::span<const SiteBlockLight> sites) override {
-        cache_.keepSites(keys_[group], sites);
+    std::optional<std::vector<glm::vec3>> findPlaces(std::span<const float> what) override {
+        return cache_.findPlaces(placesKey(rays_, what));
+    }
+    void keepPlaces(std::span<const float> what, std::span<const glm::vec3> places) override {
+        cache_.keepPlaces(placesKey(rays_, what), places);
+    }
+    std::vector<Sparse<ProbeTermLight>> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
+    void keepSites(uint32_t group, const SiteBlock& block, const Sparse<ProbeTermLight>& light) override {
+        cache_.keepSites(sitesKey(keys_[group], block), light);
     }
     std::optional<SparseLight> findRadiance(uint32_t group) override { return cache_.findRadiance(keys_[group]); }
     void keepRadiance(uint32_t group, const SparseLight& radiance) override {

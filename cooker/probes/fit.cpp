@@ -1,6 +1,8 @@
 #include <probes/fit.h>
 
+#include <algorithm>
 #include <cstddef>
+#include <functional>
 
 namespace dimmer::cook {
 namespace {
@@ -9,7 +11,18 @@ namespace {
 constexpr float prior_share = 0.05f;
 constexpr int steps_max = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
 
-using Vector = std::vector<FitValue>;
+// A FitValue and zeros up to whole registers: most of a cook's fits is spent adding such up.
+struct alignas(32) Lanes {
+    static constexpr size_t count = 32;
+    std::array<float, count> v{};
+
+    Lanes() = default;
+    explicit Lanes(const FitValue& value) { std::ranges::copy(value, v.begin()); }
+    void add(float share, const Lanes& o) {
+        for (size_t c = 0; c < count; ++c) v[c] += share * o.v[c];
+    }
+};
+using Vector = std::vector<Lanes>;
 
 // One conjugate gradient for each of the 27 right-hand sides, side by side.
 class Solver {
@@ -23,72 +36,67 @@ class Solver {
         }
     }
 
-    void solve(std::span<const FitValue> targets, float tolerance, std::span<FitValue> x) const {
-        const size_t n = x.size();
-        Vector residual(n, FitValue{}), image(n), direction(n);
+    void solve(std::span<const FitValue> targets, float tolerance, std::span<FitValue> values) const {
+        const size_t n = values.size();
+        Vector x, residual(n), image(n), direction(n);
+        for (const FitValue& value : values) x.emplace_back(value);
         for (size_t s = 0; s < sites_.size(); ++s) {
-            FitValue missing = targets[s];
+            Lanes missing(targets[s]);
             accumulate(missing, sites_[s], x, -1);
             scatter(missing, sites_[s], residual);
         }
-        FitValue power{};
+        Lanes power;
         for (size_t i = 0; i < n; ++i)
-            for (size_t c = 0; c < 27; ++c) {
-                direction[i][c] = residual[i][c] / diagonal_[i];
-                power[c] += residual[i][c] * direction[i][c];
+            for (size_t c = 0; c < Lanes::count; ++c) {
+                direction[i].v[c] = residual[i].v[c] / diagonal_[i];
+                power.v[c] += residual[i].v[c] * direction[i].v[c];
             }
-        const FitValue enough = powerOfTargets(targets, n, tolerance);
-        const auto done = [&] {
-            for (size_t c = 0; c < 27; ++c)
-                if (power[c] > enough[c]) return false;
-            return true;
-        };
+        const Lanes enough = powerOfTargets(targets, n, tolerance);
+        const auto done = [&] { return std::ranges::equal(power.v, enough.v, std::less_equal<>()); };
         for (int step = 0; step < steps_max && !done(); ++step) {
             apply(direction, image);
-            FitValue curvature{}, next{};
+            Lanes curvature, next, length, turn;
             for (size_t i = 0; i < n; ++i)
-                for (size_t c = 0; c < 27; ++c) curvature[c] += direction[i][c] * image[i][c];
-            FitValue length;
-            for (size_t c = 0; c < 27; ++c) length[c] = curvature[c] > 0 ? power[c] / curvature[c] : 0;
+                for (size_t c = 0; c < Lanes::count; ++c) curvature.v[c] += direction[i].v[c] * image[i].v[c];
+            for (size_t c = 0; c < Lanes::count; ++c)
+                length.v[c] = curvature.v[c] > 0 ? power.v[c] / curvature.v[c] : 0;
             for (size_t i = 0; i < n; ++i)
-                for (size_t c = 0; c < 27; ++c) {
-                    x[i][c] += length[c] * direction[i][c];
-                    residual[i][c] -= length[c] * image[i][c];
-                    next[c] += residual[i][c] * residual[i][c] / diagonal_[i];
+                for (size_t c = 0; c < Lanes::count; ++c) {
+                    x[i].v[c] += length.v[c] * direction[i].v[c];
+                    residual[i].v[c] -= length.v[c] * image[i].v[c];
+                    next.v[c] += residual[i].v[c] * residual[i].v[c] / diagonal_[i];
                 }
+            for (size_t c = 0; c < Lanes::count; ++c) turn.v[c] = power.v[c] > 0 ? next.v[c] / power.v[c] : 0;
             for (size_t i = 0; i < n; ++i)
-                for (size_t c = 0; c < 27; ++c) {
-                    const float turn = power[c] > 0 ? next[c] / power[c] : 0;
-                    direction[i][c] = residual[i][c] / diagonal_[i] + turn * direction[i][c];
-                }
+                for (size_t c = 0; c < Lanes::count; ++c)
+                    direction[i].v[c] = residual[i].v[c] / diagonal_[i] + turn.v[c] * direction[i].v[c];
             power = next;
         }
+        for (size_t i = 0; i < n; ++i) std::copy_n(x[i].v.begin(), values[i].size(), values[i].begin());
     }
 
    private:
     // Below which a residual's power is at most `tolerance`, squared, of that of all light.
-    FitValue powerOfTargets(std::span<const FitValue> targets, size_t n, float tolerance) const {
-        Vector image(n, FitValue{});
-        for (size_t s = 0; s < sites_.size(); ++s) scatter(targets[s], sites_[s], image);
-        FitValue power{};
+    Lanes powerOfTargets(std::span<const FitValue> targets, size_t n, float tolerance) const {
+        Vector image(n);
+        for (size_t s = 0; s < sites_.size(); ++s) scatter(Lanes(targets[s]), sites_[s], image);
+        Lanes power;
         for (size_t i = 0; i < n; ++i)
-            for (size_t c = 0; c < 27; ++c) power[c] += image[i][c] * image[i][c] / diagonal_[i];
-        for (float& p : power) p *= tolerance * tolerance;
+            for (size_t c = 0; c < Lanes::count; ++c) power.v[c] += image[i].v[c] * image[i].v[c] / diagonal_[i];
+        for (float& p : power.v) p *= tolerance * tolerance;
         return power;
     }
-    static void accumulate(FitValue& sum, const FitSite& s, std::span<const FitValue> x, float sign) {
-        for (size_t k = 0; k < 4; ++k)
-            for (size_t c = 0; c < 27; ++c) sum[c] += sign * s.shares[k] * x[s.probes[k]][c];
+    static void accumulate(Lanes& sum, const FitSite& s, const Vector& x, float sign) {
+        for (size_t k = 0; k < 4; ++k) sum.add(sign * s.shares[k], x[s.probes[k]]);
     }
-    static void scatter(const FitValue& value, const FitSite& s, Vector& out) {
-        for (size_t k = 0; k < 4; ++k)
-            for (size_t c = 0; c < 27; ++c) out[s.probes[k]][c] += s.importance * s.shares[k] * value[c];
+    static void scatter(const Lanes& value, const FitSite& s, Vector& out) {
+        for (size_t k = 0; k < 4; ++k) out[s.probes[k]].add(s.importance * s.shares[k], value);
     }
     void apply(const Vector& x, Vector& out) const {
         for (size_t i = 0; i < x.size(); ++i)
-            for (size_t c = 0; c < 27; ++c) out[i][c] = prior_[i] * x[i][c];
+            for (size_t c = 0; c < Lanes::count; ++c) out[i].v[c] = prior_[i] * x[i].v[c];
         for (const FitSite& s : sites_) {
-            FitValue sum{};
+            Lanes sum;
             accumulate(sum, s, x, 1);
             scatter(sum, s, out);
         }

@@ -2,6 +2,8 @@
 
 #include <bake/sampling.h>
 
+#include <algorithm>
+
 namespace dimmer::cook {
 namespace {
 
@@ -19,7 +21,8 @@ class Surroundings {
             const glm::vec3 direction = uniformSphereDirection(sequence2d(i, 1));
             const auto hit = rays_.nearest(point_m_, direction, far_away_m, i, Surfaces::All, ignored_);
             if (!hit) continue;
-            is_close_ = hit->distance_m < clearance_m_;
+            nearest_m_ = std::min(nearest_m_, hit->distance_m);
+            is_close_ = nearest_m_ < clearance_m_;
             const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
             const bool back = hit->back && !rays_.scene().materials[triangle.material].double_sided;
             // The foot of a door's leaf often lies in the floor's plane, and shows through it from below.
@@ -29,6 +32,7 @@ class Surroundings {
         }
     }
     bool looksOpen() const { return !is_close_ && 4 * backs_ < hits_; }
+    float nearestM() const { return nearest_m_; }
     bool isSure() const { return backs_ == 0 && 4 * hits_ >= 3 * few_rays; }
 
    private:
@@ -36,19 +40,30 @@ class Surroundings {
     glm::vec3 point_m_;
     uint32_t ignored_;
     float clearance_m_;
+    float nearest_m_ = far_away_m;
     uint32_t hits_ = 0, backs_ = 0;
     bool is_close_ = false;
 };
+
+// After few_rays.
+bool staysOpen(Surroundings& around) {
+    // Of thousands of places outside of a level, from where most rays meet nothing, some pass by luck.
+    if (around.looksOpen() && !around.isSure()) around.look(few_rays, many_rays);
+    return around.looksOpen();
+}
 
 }  // namespace
 
 bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored, float clearance_m) {
     Surroundings around(rays, point_m, ignored, clearance_m);
     around.look(0, few_rays);
-    if (!around.looksOpen() || around.isSure()) return around.looksOpen();
-    // Of thousands of places outside of a level, from where most rays meet nothing, some pass by luck.
-    around.look(few_rays, many_rays);
-    return around.looksOpen();
+    return staysOpen(around);
+}
+
+bool chosenInTheOpen(const RayScene& rays, glm::vec3 point_m, float near_m, float chance) {
+    Surroundings around(rays, point_m, no_model, probe_clearance_m);
+    around.look(0, few_rays);
+    return chance * around.nearestM() < near_m && staysOpen(around);
 }
 
 std::vector<glm::vec3> openPlaces(const RayScene& rays, uint32_t count, uint32_t seed) {

@@ -9,11 +9,18 @@
 
 namespace dimmer::cook {
 
+inline constexpr float probe_clearance_m = 0.05f;
+
 // In the open: not inside closed geometry or a closed leaf, not outside of the level, not close to a surface: a
 // probe there stands for little but that.
 // Some rays: a quarter of what they hit may be backs, fronts of doors' leaves aside. `ignored`: a model that is not
 // there.
-bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored = no_model, float clearance_m = 0.05f);
+bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored = no_model,
+               float clearance_m = probe_clearance_m);
+
+// In the open and, far from surfaces, chosen: nearer than `near_m` to one all are, elsewhere so many fewer as they are
+// farther away. `chance`: the place's own, 0 to 1.
+bool chosenInTheOpen(const RayScene& rays, glm::vec3 point_m, float near_m, float chance);
 
 // Random places in the open, evenly over the level's box; fewer where the level has hardly any. The same seed gives the
 // same places.

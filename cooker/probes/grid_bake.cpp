@@ -34,10 +34,24 @@ std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed,
     return rows;
 }
 
+// The light of one term at one site.
+struct SiteTerm {
+    uint32_t site;
+    const ProbeLight* light;
+};
+
+// Per term, ascending sites. Points into `light`.
+std::vector<std::vector<SiteTerm>> byTerm(const Sparse<ProbeTermLight>& light, size_t terms) {
+    std::vector<std::vector<SiteTerm>> sites(terms);
+    for (uint32_t s = 0; s < light.rows(); ++s)
+        for (const ProbeTermLight& l : light.row(s)) sites[l.term].push_back({s, &l.light});
+    return sites;
+}
+
 // One term over the probes that have it and the sites where they count.
 class TermFit {
    public:
-    TermFit(const Placement& placed, const Sparse<ProbeTermLight>& light)
+    TermFit(const Placement& placed, std::span<const SiteTerm> light)
         : placed_(placed), light_(light), number_(placed.place_of.size(), no_probe) {}
 
     void fit(uint32_t term, std::vector<std::vector<ProbeTermLight>>& rows) {
@@ -53,7 +67,7 @@ class TermFit {
         std::vector<uint8_t> guessed;
         for (size_t i = 0; i < number_.size(); ++i)
             if (number_[i] != no_probe) guessed.push_back(placed_.guessed[i]);
-        chooseSites(term);
+        chooseSites();
         fitProbes(sites_, targets_, probes, fit_tolerance, guessed);
         for (size_t i = 0; i < members.size(); ++i)
             for (size_t k = 0; k < 27; ++k) members[i]->light.radiance[k / 3][static_cast<int>(k % 3)] = probes[i][k];
@@ -67,10 +81,13 @@ class TermFit {
     }
 
     // Those with a probe of the term; where it is not active it is as good as dark.
-    void chooseSites(uint32_t term) {
-        sites_.clear();
-        targets_.clear();
-        for (size_t s = 0; s < placed_.sites.size(); ++s) {
+    void chooseSites() {
+        auto lit = light_.begin();
+        for (uint32_t s = 0; s < placed_.sites.size(); ++s) {
+            while (lit != light_.end() && lit->site < s) ++lit;
+            // Most terms are of few probes, and most sites none of theirs.
+            const auto& around = placed_.sites[s].probes;
+            if (std::ranges::none_of(around, [&](uint32_t p) { return number_[p] != no_probe; })) continue;
             FitSite site = placed_.sites[s];
             float known = 0;
             for (size_t k = 0; k < 4; ++k) {
@@ -80,9 +97,7 @@ class TermFit {
                 known += site.shares[k];
             }
             if (!(known > 0)) continue;
-            const auto terms = light_.row(s);
-            const auto found = std::ranges::find(terms, term, &ProbeTermLight::term);
-            targets_.push_back(found == terms.end() ? FitValue{} : valueOf(found->light));
+            targets_.push_back(lit != light_.end() && lit->site == s ? valueOf(*lit->light) : FitValue{});
             sites_.push_back(site);
         }
         decideImportance();
@@ -102,8 +117,8 @@ class TermFit {
     }
 
     const Placement& placed_;
-    const Sparse<ProbeTermLight>& light_;  // per site
-    std::vector<uint32_t> number_;         // per position, among the probes of the term
+    std::span<const SiteTerm> light_;
+    std::vector<uint32_t> number_;  // per position, among the probes of the term
     std::vector<FitSite> sites_;
     std::vector<FitValue> targets_;
 };
@@ -115,15 +130,16 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
     BakedGrid out;
     out.free_volume_m3 = choice.free_volume_m3;
     if (choice.blocks.empty()) return out;
-    const std::vector<FitValue> states = statesOf(light, terms, choice.blocks[0].places_m.size());
+    const std::vector<FitValue> states = statesOf(light, terms, siteOrder(choice.blocks));
     auto placed = placeProbes(rays, choice, states, settings, progress);
     if (!placed) return std::unexpected(placed.error());
     progress.stage("probes", terms.size());
     // Blocks of rows are large for so few receivers, so each row is made on its own.
     auto rows = tracedAtProbes(*placed, light);
+    const auto sites = byTerm(light, terms.size());
     if (settings.fit)
         tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) {
-            TermFit(*placed, light).fit(static_cast<uint32_t>(t), rows);
+            TermFit(*placed, sites[t]).fit(static_cast<uint32_t>(t), rows);
             progress.advance(1);
         });
     out.light = Sparse<ProbeTermLight>::build(placed->place_of.size(), [&](size_t begin, size_t end, auto emit) {

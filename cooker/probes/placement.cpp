@@ -15,8 +15,14 @@ namespace {
 
 constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
-constexpr double growth = 0.3;         // of the number of probes in a round, at most
+// Of the number of probes in a round, at most: where there are few, each counts.
+constexpr double growth_of_few = 0.3, growth_of_many = 0.45;
+constexpr size_t few_probes = 1000;
 constexpr uint32_t grow_rounds_max = 64;
+// Few probes are judged at as many places each as all of them are in the end, and this many times more, but not at
+// fewer than so many.
+constexpr double places_to_spare = 1.5;
+constexpr size_t places_min = 8000;
 // The more sites there are to a probe, the more rounds of exchange find better ones among them; among thousands of
 // probes a round takes a second and mends half a hundredth of the error or nothing.
 constexpr size_t sites_per_exchange = 3, exchange_rounds_max = 16, exchanges_times_probes = 1000;
@@ -44,7 +50,7 @@ class Placer {
 
     Expected<Placement> run() {
         settings_.uniform ? placeLattice() : placeCoarse();
-        if (auto ok = build(); !ok) return std::unexpected(ok.error());
+        if (auto ok = settings_.uniform ? build() : buildToGrow(); !ok) return std::unexpected(ok.error());
         if (!settings_.uniform) {
             progress_.stage("probe placement", exchangeRounds() + 2);
             if (auto ok = grow(); !ok) return std::unexpected(ok.error());
@@ -55,16 +61,22 @@ class Placer {
     }
 
    private:
-    Expected<void> build() { return trial_.build(probes_); }
+    Expected<void> build() { return trial_.build(probes_, trial_.placeCount()); }
+    Expected<void> buildToGrow() {
+        const double share = static_cast<double>(probes_.places.size()) / static_cast<double>(limit_);
+        const auto places = static_cast<size_t>(places_to_spare * share * static_cast<double>(trial_.placeCount()));
+        return trial_.build(probes_, std::min(std::max(places, places_min), trial_.placeCount()));
+    }
 
     // Adds probes until they are as many as may be, or nothing is wrong.
     Expected<void> grow() {
         for (uint32_t round = 0; round < grow_rounds_max && probes_.places.size() < limit_; ++round) {
-            if (!refine()) break;
-            if (auto ok = build(); !ok) return ok;
+            const bool grown = refine();
+            if (!grown && trial_.looksAtAll()) break;
+            if (auto ok = grown ? buildToGrow() : build(); !ok) return ok;
         }
         progress_.advance(1);
-        return {};
+        return trial_.looksAtAll() ? Expected<void>{} : build();
     }
 
     // Again and again, a fifth of the probes that do least go, and others come where they are needed more; the best
@@ -239,7 +251,7 @@ class Placer {
         };
         const auto& [placement, at, errors] = trial_.result();
         std::map<uint32_t, Cell> cells;
-        for (uint32_t i = 0; i < trial_.placeCount(); ++i)
+        for (uint32_t i = 0; i < errors.size(); ++i)
             if (errors[i] > settings_.tolerance) {
                 Cell& cell = cells[at[i].tetrahedron];
                 cell.sum += errors[i];
@@ -249,6 +261,7 @@ class Placer {
         for (auto& [t, cell] : cells) order.push_back(&cell);
         std::ranges::stable_sort(order, [](const Cell* a, const Cell* b) { return a->sum > b->sum; });
         const size_t before = probes_.places.size();
+        const double growth = limit_ <= few_probes ? growth_of_few : growth_of_many;
         const size_t most =
             std::min(limit_, before + std::max<size_t>(8, static_cast<size_t>(growth * static_cast<double>(before))));
         ++level_;

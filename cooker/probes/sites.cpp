@@ -27,6 +27,10 @@ constexpr uint32_t tries_per_site = 16;
 constexpr double share_near_lamps = 0.5;
 constexpr double lamp_reach_spacings = 2.2;
 constexpr float lamp_reach_min_m = 0.8f;
+// Light changes over lengths like the distance to surfaces (Ward and Heckbert 1992), and what asks for it moves near
+// them: places farther off than this many times the mean spacing of probes become rarer.
+constexpr double near_spacings = 0.5;
+constexpr uint32_t rarity_seed = 0x2c1b3c6du;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
 constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
@@ -37,7 +41,8 @@ constexpr float weight_of_sets = 0.05f;
 
 class Chooser {
    public:
-    Chooser(const RayScene& rays, const GridSettings& settings) : rays_(rays), settings_(settings) {
+    Chooser(const RayScene& rays, const GridSettings& settings, GroupStore* store)
+        : rays_(rays), settings_(settings), store_(store) {
         for (const PunctualLight& light : rays.scene().lights)
             if (light.type != LightType::Directional && light.bake != BakeMode::None &&
                 std::ranges::find(lamps_, light.position_m) == lamps_.end())
@@ -48,11 +53,11 @@ class Chooser {
         const uint32_t wanted = decideCounts();
         const uint32_t rays = std::clamp(small_level_rays / std::max(wanted, 1u), site_rays_min, site_rays_max);
         const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
-        out_.blocks.push_back({open(wanted - at_lamps, [&](uint32_t i) { return anywhere(i); }), rays});
+        out_.blocks.push_back({allOver(wanted - at_lamps), rays});
         const auto lamps = static_cast<uint32_t>(lamps_.size());
         for (const glm::vec3 lamp : lamps_)
             if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
-                out_.blocks.push_back({open(count, [&](uint32_t i) { return nearLamp(lamp, i); }), rays});
+                out_.blocks.push_back({around(lamp, count), rays});
         if (out_.places().empty()) {
             out_.blocks.clear();
             return std::move(out_);
@@ -66,10 +71,13 @@ class Chooser {
    private:
     // Of sites wanted.
     uint32_t decideCounts() {
-        const auto is_free = test(0, first_look, [&](uint32_t i) { return anywhere(i); });
+        const auto free = remembered({static_cast<float>(first_look)}, [&] {
+            return chosen(
+                0, first_look, [&](uint32_t i) { return anywhere(i); },
+                [&](glm::vec3 p, uint32_t) { return inTheOpen(rays_, p); });
+        });
         const glm::dvec3 size = glm::dvec3(rays_.boundsMax()) - glm::dvec3(rays_.boundsMin());
-        out_.free_volume_m3 =
-            static_cast<double>(std::ranges::count(is_free, 1)) / first_look * size.x * size.y * size.z;
+        out_.free_volume_m3 = static_cast<double>(free.size()) / first_look * size.x * size.y * size.z;
         // The box's corners are probes too.
         const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0),
                                                   static_cast<double>(settings_.probes_max)));
@@ -78,6 +86,8 @@ class Chooser {
         const double most = std::max(many_sites, sites_per_probe_affordable * probes);
         const double wanted = std::clamp(settings_.sites * probes, least, most);
         const double spacing_m = std::cbrt(out_.free_volume_m3 / ((1 - share_near_lamps) * wanted));
+        near_m_ = settings_.uniform ? far_away_m
+                                    : static_cast<float>(near_spacings * std::cbrt(out_.free_volume_m3 / probes));
         lamp_reach_m_ = std::max(lamp_reach_min_m, static_cast<float>(lamp_reach_spacings * spacing_m));
         return static_cast<uint32_t>(wanted);
     }
@@ -92,21 +102,48 @@ class Chooser {
         return lamp_m + lamp_reach_m_ * u.z * uniformSphereDirection({u.x, u.y});
     }
 
-    std::vector<uint8_t> test(uint32_t begin, uint32_t count, auto&& at) const {
-        std::vector<uint8_t> is_free(count);
-        tbb::parallel_for(0u, count, [&](uint32_t i) { is_free[i] = inTheOpen(rays_, at(begin + i)); });
-        return is_free;
+    std::vector<glm::vec3> allOver(uint32_t count) const {
+        return sites({static_cast<float>(count), near_m_}, count, [&](uint32_t i) { return anywhere(i); });
+    }
+    std::vector<glm::vec3> around(glm::vec3 lamp_m, uint32_t count) const {
+        return sites({static_cast<float>(count), near_m_, lamp_reach_m_, lamp_m.x, lamp_m.y, lamp_m.z}, count,
+                     [&](uint32_t i) { return nearLamp(lamp_m, i); });
+    }
+    std::vector<glm::vec3> sites(const std::vector<float>& what, uint32_t count, auto&& at) const {
+        return remembered(what, [&] {
+            return first(count, at, [&](glm::vec3 p, uint32_t i) {
+                return chosenInTheOpen(rays_, p, near_m_, unitFloat(hash(i, rarity_seed)));
+            });
+        });
     }
 
-    // The first `count` that are in the open of at most 16 times as many.
-    std::vector<glm::vec3> open(uint32_t count, auto&& at) const {
+    // What an earlier cook found of the same. `what`: all that it depends on besides the level's geometry.
+    std::vector<glm::vec3> remembered(const std::vector<float>& what, auto&& find) const {
+        if (store_)
+            if (auto places = store_->findPlaces(what)) return std::move(*places);
+        const std::vector<glm::vec3> places = find();
+        if (store_) store_->keepPlaces(what, places);
+        return places;
+    }
+
+    // Of `count` places those that are `wanted`, in their order.
+    static std::vector<glm::vec3> chosen(uint32_t begin, uint32_t count, auto&& at, auto&& wanted) {
+        std::vector<uint8_t> is_wanted(count);
+        tbb::parallel_for(0u, count, [&](uint32_t i) { is_wanted[i] = wanted(at(begin + i), begin + i); });
+        std::vector<glm::vec3> places;
+        for (uint32_t i = 0; i < count; ++i)
+            if (is_wanted[i]) places.push_back(at(begin + i));
+        return places;
+    }
+
+    // The first `count` that are wanted of at most so many times as many.
+    static std::vector<glm::vec3> first(uint32_t count, auto&& at, auto&& wanted) {
         std::vector<glm::vec3> places;
         const uint32_t tries = tries_per_site * count;
         for (uint32_t tried = 0; places.size() < count && tried < tries;) {
             const uint32_t block = std::min(std::clamp(count, 64u, 4096u), tries - tried);
-            const auto is_free = test(tried, block, at);
-            for (uint32_t i = 0; i < block; ++i)
-                if (is_free[i] && places.size() < count) places.push_back(at(tried + i));
+            for (const glm::vec3 p : chosen(tried, block, at, wanted))
+                if (places.size() < count) places.push_back(p);
             tried += block;
         }
         return places;
@@ -126,8 +163,9 @@ class Chooser {
 
     const RayScene& rays_;
     const GridSettings& settings_;
+    GroupStore* store_;
     std::vector<glm::vec3> lamps_;
-    float lamp_reach_m_ = 0;
+    float lamp_reach_m_ = 0, near_m_ = 0;
     SiteChoice out_;
 };
 
@@ -191,6 +229,19 @@ class PlaceTrace {
     std::vector<uint32_t> wanted_in_group_;
 };
 
+// Light of some groups alone: rays of single groups, whose ends are known, do little else than read it.
+SparseLight ofGroups(const SparseLight& light, std::span<const Term> terms, std::span<const uint8_t> groups) {
+    return SparseLight::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
+        std::vector<TermLight> row;
+        for (size_t i = begin; i < end; ++i) {
+            row.clear();
+            for (const TermLight& l : light.row(i))
+                if (groups[terms[l.term].group]) row.push_back(l);
+            emit(std::span<const TermLight>(row));
+        }
+    });
+}
+
 // Where the rays of blocks of places end: what a store knows, and what it is to know.
 class SiteRays {
    public:
@@ -233,49 +284,72 @@ class SiteRays {
     std::vector<std::vector<std::vector<uint32_t>>> fresh_;  // per block and place
 };
 
-std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
-    std::vector<double> sums, counts;
+// Of each group over the rows that count: light that it sends, and how many it reaches.
+struct GroupSums {
+    std::vector<double> lux, rows;
+};
+GroupSums sumsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, uint32_t groups,
+                       auto&& counts) {
+    GroupSums sums{std::vector<double>(groups), std::vector<double>(groups)};
     for (size_t i = 0; i < light.rows(); ++i) {
-        if (i == even && std::ranges::any_of(sums, [](double sum) { return sum > 0; })) break;
+        if (!counts(i)) continue;
         for (const ProbeTermLight& l : light.row(i)) {
             const Term& term = terms[l.term];
             if (!term.free()) continue;
-            sums.resize(std::max<size_t>(sums.size(), term.group + 1));
-            counts.resize(sums.size());
             const auto lux = static_cast<double>(luminance(l.light.irradiance()));
-            sums[term.group] += lux;
-            counts[term.group] += lux > 0;
+            sums.lux[term.group] += lux;
+            sums.rows[term.group] += lux > 0;
         }
     }
-    std::vector<float> weights(1 + std::ranges::max(terms, {}, &Term::group).group);
-    for (size_t g = 0; g < sums.size(); ++g)
-        if (sums[g] > 0)
-            weights[g] = static_cast<float>(counts[g] / sums[g]) * (g == always_group ? 1 : weight_of_sets);
+    return sums;
+}
+
+std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
+                                   std::span<const SiteRow> order) {
+    const uint32_t groups = 1 + std::ranges::max(terms, {}, &Term::group).group;
+    GroupSums sums = sumsOfGroups(light, terms, groups, [&](size_t i) { return order[i].block == 0; });
+    if (std::ranges::max(sums.lux) == 0) sums = sumsOfGroups(light, terms, groups, [](size_t) { return true; });
+    std::vector<float> weights(groups);
+    for (uint32_t g = 0; g < groups; ++g)
+        if (sums.lux[g] > 0)
+            weights[g] = static_cast<float>(sums.rows[g] / sums.lux[g]) * (g == always_group ? 1 : weight_of_sets);
     return weights;
 }
 
 }  // namespace
 
+std::vector<SiteRow> siteOrder(std::span<const SiteBlock> blocks) {
+    std::vector<SiteRow> order;
+    if (blocks.empty()) return order;
+    for (size_t b = 0; b + 1 < blocks.size(); ++b)
+        for (size_t i = 0; i < blocks[b].places_m.size(); ++i) order.push_back({b, i});
+    std::ranges::stable_sort(order, {}, [&](const SiteRow& r) {
+        return static_cast<double>(r.row) / static_cast<double>(blocks[r.block].places_m.size());
+    });
+    for (size_t i = 0; i < blocks.back().places_m.size(); ++i) order.push_back({blocks.size() - 1, i});
+    return order;
+}
+
 std::vector<glm::vec3> SiteChoice::places() const {
     std::vector<glm::vec3> all;
-    for (const SiteBlock& block : blocks) all.insert(all.end(), block.places_m.begin(), block.places_m.end());
+    for (const SiteRow& r : siteOrder(blocks)) all.push_back(blocks[r.block].places_m[r.row]);
     return all;
 }
 
-Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings) {
-    return Chooser(rays, settings).run();
+Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings, GroupStore* store) {
+    return Chooser(rays, settings, store).run();
 }
 
 SiteLight::SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, GroupStore* store)
     : blocks_(blocks),
       paths_(paths),
       store_(store),
-      light_(paths.groupCount(), std::vector<SiteBlockLight>(blocks.size())) {
-    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
-        for (SiteBlockLight& known : store->findSites(g, blocks))
-            if (const auto block = std::ranges::find(blocks, known.block);
-                block != blocks.end() && fits(known.light, block->places_m.size(), paths.termsOf(g).size()))
-                light_[g][static_cast<size_t>(block - blocks.begin())] = std::move(known);
+      light_(paths.groupCount(), std::vector<Sparse<ProbeTermLight>>(blocks.size())) {
+    for (uint32_t g = 0; store && g < paths.groupCount(); ++g) {
+        auto known = store->findSites(g, blocks);
+        for (size_t b = 0; b < blocks.size(); ++b)
+            if (fits(known[b], blocks[b].places_m.size(), paths.termsOf(g).size())) light_[g][b] = std::move(known[b]);
+    }
 }
 
 std::vector<uint8_t> SiteLight::asked() const {
@@ -323,11 +397,13 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
         std::vector<std::pair<size_t, size_t>> places;  // block and row
         for (const size_t b : blocks)
             for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) places.emplace_back(b, i);
+        const bool all = std::ranges::count(wanted, 0) == 0;
+        const SparseLight some = all ? SparseLight() : ofGroups(radiance, paths_.terms(), wanted);
         SiteRays rays(blocks_, blocks, store_, static_cast<uint32_t>(gatherer.receiverCount()));
         progress.stage("light at probe sites", places.size());
         std::vector<Row> rows(places.size());
         tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
-            PlaceTrace trace(gatherer, lights, radiance, reports, settings, wanted);
+            PlaceTrace trace(gatherer, lights, all ? radiance : some, reports, settings, wanted);
             std::vector<uint32_t> ends;
             for (size_t i = range.begin(); i < range.end(); ++i) {
                 const auto [b, k] = places[i];
@@ -340,8 +416,6 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
         rays.keep();
         share(rows, blocks, groups);
     }
-    for (uint32_t g = 0; store_ && g < light_.size(); ++g)
-        if (asked_groups[g]) store_->keepSites(g, light_[g]);
     return traced;
 }
 
@@ -349,20 +423,21 @@ void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks,
     for (const size_t b : blocks) {
         const auto here = rows.first(blocks_[b].places_m.size());
         rows = rows.subspan(here.size());
-        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g)};
+        for (const uint32_t g : groups) {
+            light_[g][b] = ofGroup(here, g);
+            if (store_) store_->keepSites(g, blocks_[b], light_[g][b]);
+        }
     }
 }
 
 Sparse<ProbeTermLight> SiteLight::take() {
-    std::vector<std::pair<size_t, size_t>> where;  // block and row of each place
-    for (size_t b = 0; b < blocks_.size(); ++b)
-        for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) where.emplace_back(b, i);
-    auto all = Sparse<ProbeTermLight>::build(where.size(), [&](size_t begin, size_t end, auto emit) {
+    const std::vector<SiteRow> order = siteOrder(blocks_);
+    auto all = Sparse<ProbeTermLight>::build(order.size(), [&](size_t begin, size_t end, auto emit) {
         std::vector<ProbeTermLight> row;
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (uint32_t g = 0; g < paths_.groupCount(); ++g)
-                for (const ProbeTermLight& l : light_[g][where[i].first].light.row(where[i].second))
+                for (const ProbeTermLight& l : light_[g][order[i].block].row(order[i].row))
                     row.push_back({paths_.termsOf(g)[l.term], l.light, 0, 0});
             std::ranges::sort(row, {}, &ProbeTermLight::term);
             emit(std::span<const ProbeTermLight>(row));
@@ -372,8 +447,9 @@ Sparse<ProbeTermLight> SiteLight::take() {
     return all;
 }
 
-std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even) {
-    const std::vector<float> weights = weightsOfGroups(light, terms, even);
+std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
+                               std::span<const SiteRow> order) {
+    const std::vector<float> weights = weightsOfGroups(light, terms, order);
     std::vector<FitValue> states(light.rows(), FitValue{});
     tbb::parallel_for(size_t{0}, light.rows(), [&](size_t i) {
         for (const ProbeTermLight& l : light.row(i)) {

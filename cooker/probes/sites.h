@@ -21,11 +21,19 @@ struct SiteChoice {
     size_t probes_max = 0;          // as the settings and the level's size have it
     double free_volume_m3 = 0;
 
-    // Of all blocks.
+    // Of all blocks, in siteOrder().
     std::vector<glm::vec3> places() const;
 };
 
-Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings);
+// In which order the rows of all blocks are looked at: as many of the first ones as one likes are spread as all are.
+// The last block's, corners of the box, come last.
+struct SiteRow {
+    size_t block, row;
+};
+std::vector<SiteRow> siteOrder(std::span<const SiteBlock> blocks);
+
+// `store`: may be null.
+Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings, GroupStore* store);
 
 // What is known of the light at the places, per group and block; the rest is to be traced.
 class SiteLight {
@@ -39,7 +47,7 @@ class SiteLight {
     // as the noise needs to be small beside what interpolation misses. Returns the rays traced.
     uint64_t trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
                    const BakeSettings& settings, Progress& progress);
-    // Per place, ascending, what is active there. Empties this.
+    // Per place in siteOrder(), ascending, what is active there. Empties this.
     Sparse<ProbeTermLight> take();
 
    private:
@@ -47,19 +55,20 @@ class SiteLight {
     std::vector<uint32_t> missingAt(size_t block) const;
     void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
     Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group) const;
-    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].light.rows() == 0; }
+    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].rows() == 0; }
 
     std::span<const SiteBlock> blocks_;
     const DoorPaths& paths_;
     GroupStore* store_;
-    std::vector<std::vector<SiteBlockLight>> light_;  // per group, per block; no rows: missing
+    std::vector<std::vector<Sparse<ProbeTermLight>>> light_;  // per group, per block; no rows: missing
 };
 
 // What placement looks at: all light together, then each half of the light sets, so that light which leaks from a set's
 // room into a dark one is seen; doors closed. Luminance of the radiance, nine coefficients of each state. Every group
-// counts by its own mean over those of the first `even` places (all over the level) that it reaches: where probes stand
-// does not depend on how bright a set is.
+// counts by its own mean over those of the first block's places (all over the level) that it reaches: where probes
+// stand does not depend on how bright a set is. `order`: of the light's rows.
 inline constexpr size_t site_states = 3;
-std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms, size_t even);
+std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
+                               std::span<const SiteRow> order);
 
 }  // namespace dimmer::cook

@@ -91,7 +91,7 @@ void TrialGrid::decideImportance() {
     }
 }
 
-Expected<void> TrialGrid::build(const ChosenProbes& probes) {
+Expected<void> TrialGrid::build(const ChosenProbes& probes, size_t places) {
     probes_ = probes;
     is_probe_.assign(first_corner_, false);
     std::vector<glm::vec3> points;
@@ -104,7 +104,7 @@ Expected<void> TrialGrid::build(const ChosenProbes& probes) {
     result_.placement.grid = std::move(*grid);
     std::ranges::copy(probes_.levels, result_.placement.grid.levels.begin());
     findPlaces();
-    locatePlaces();
+    locatePlaces(places);
     if (settings_.visibility) findVisibility(Asked::AtPlaces, search_points_);
     findShares();
     findErrors();
@@ -124,8 +124,6 @@ Placement TrialGrid::take() {
         findVisibility(Asked::Anywhere, visibility_points);
         findShares();
     }
-    // Corners of the box were traced for themselves: outside of the level they would tell probes of darkness.
-    result_.placement.sites.resize(first_corner_);
     return std::move(result_.placement);
 }
 
@@ -159,17 +157,18 @@ void TrialGrid::findPlaces() {
     }
 }
 
-void TrialGrid::locatePlaces() {
-    result_.at.resize(places_.size());
-    tbb::parallel_for(size_t{0}, places_.size(), [&](size_t i) {
+// Not the box's corners, which were traced for themselves: outside of the level they would tell probes of darkness.
+void TrialGrid::locatePlaces(size_t places) {
+    result_.at.resize(places);
+    tbb::parallel_for(size_t{0}, places, [&](size_t i) {
         const glm::vec3 p = places_[i];
         result_.at[i] = locate(result_.placement.grid, {p.x, p.y, p.z});
     });
 }
 
 void TrialGrid::findShares() {
-    result_.placement.sites.resize(places_.size());
-    tbb::parallel_for(size_t{0}, places_.size(), [&](size_t i) {
+    result_.placement.sites.resize(result_.at.size());
+    tbb::parallel_for(size_t{0}, result_.at.size(), [&](size_t i) {
         result_.placement.sites[i] = {.probes = result_.placement.grid.tetrahedra[result_.at[i].tetrahedron].probes,
                                       .shares = probeWeights(result_.placement.grid, result_.at[i]),
                                       .importance = importance_[i]};
@@ -196,7 +195,7 @@ void TrialGrid::findVisibility(Asked asked, uint32_t points) {
     GlobalGrid& grid = result_.placement.grid;
     grid.visibility.assign(grid.tetrahedra.size(), {});
     std::vector<uint8_t> wanted(grid.tetrahedra.size(), asked == Asked::Anywhere);
-    for (size_t i = 0; i < first_corner_; ++i)
+    for (size_t i = 0; i < result_.at.size(); ++i)
         if (!is_probe_[i]) wanted[result_.at[i].tetrahedron] = 1;
     std::vector<uint32_t> fresh, number(grid.tetrahedra.size(), no_index);
     for (uint32_t t = 0; t < grid.tetrahedra.size(); ++t) {
@@ -210,7 +209,7 @@ void TrialGrid::findVisibility(Asked asked, uint32_t points) {
         }
     }
     std::vector<std::vector<std::array<float, 4>>> inside(fresh.size());
-    for (size_t i = 0; i < first_corner_; ++i)
+    for (size_t i = 0; i < result_.at.size(); ++i)
         if (const uint32_t n = number[result_.at[i].tetrahedron]; n != no_index && !is_probe_[i])
             inside[n].push_back(result_.at[i].barycentric);
     tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
@@ -237,11 +236,11 @@ float TrialGrid::errorOf(const FitValue& light, const FitValue& traced) const {
 void TrialGrid::findErrors() {
     std::vector<FitValue> probes;
     for (const uint32_t place : result_.placement.place_of) probes.push_back(states_[place]);
-    fitProbes(std::span(result_.placement.sites).first(first_corner_), states_.first(first_corner_), probes,
-              search_tolerance, result_.placement.guessed);
-    result_.errors.resize(first_corner_);
-    tbb::parallel_for(size_t{0}, first_corner_, [&](size_t i) {
-        const FitSite& site = result_.placement.sites[i];
+    const std::vector<FitSite>& sites = result_.placement.sites;
+    fitProbes(sites, states_.first(sites.size()), probes, search_tolerance, result_.placement.guessed);
+    result_.errors.resize(sites.size());
+    tbb::parallel_for(size_t{0}, sites.size(), [&](size_t i) {
+        const FitSite& site = sites[i];
         FitValue light{};
         for (size_t k = 0; k < 4; ++k)
             for (size_t c = 0; c < light.size(); ++c) light[c] += site.shares[k] * probes[site.probes[k]][c];

@@ -21,18 +21,19 @@ class TrialGrid {
     TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
               const GridSettings& settings);
 
-    // All that follows is of the last grid built.
-    Expected<void> build(const ChosenProbes& probes);
+    // All that follows is of the last grid built, and of the first `places`: fewer than placeCount() cost less.
+    Expected<void> build(const ChosenProbes& probes, size_t places);
 
     struct Result {
-        Placement placement;  // with the corners' sites behind the others
+        Placement placement;  // sites: the places looked at
         std::vector<GridPlace> at;
-        std::vector<float> errors;  // per place but corners; 0 for probes
+        std::vector<float> errors;  // 0 for probes
     };
     const Result& result() const { return result_; }
     // Takes an earlier result of build() for the last one.
     void restore(ChosenProbes probes, Result result);
-    // With tables as close as packs have them: those of build() are quick ones.
+    bool looksAtAll() const { return result_.errors.size() == placeCount(); }
+    // With tables as close as packs have them: those of build() are quick ones. Of all places.
     Placement take();
 
     double meanError() const;
@@ -48,7 +49,7 @@ class TrialGrid {
     uint32_t placeOf(uint32_t position) const;
     bool isFree(uint32_t position) const;
     void findPlaces();
-    void locatePlaces();
+    void locatePlaces(size_t places);
     Key keyOf(const Tetrahedron& t) const;
     // Of tetrahedra in which somebody asks for light: a game may anywhere.
     enum class Asked : uint8_t { AtPlaces, Anywhere };

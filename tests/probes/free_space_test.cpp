@@ -60,5 +60,19 @@ TEST(FreeSpace, ADoorsFootDoesNotOpenWhatLiesBelowTheFloor) {
     EXPECT_TRUE(inTheOpen(rays, {0, 2, 0}));    // above it
 }
 
+// In the middle of a cube the nearest wall is 5 m off; 24 rays meet it within 5 / cos(25 degrees), as none of them is
+// farther than that from some axis.
+TEST(FreeSpace, FarFromSurfacesPlacesAreChosenAsOftenAsTheyAreNear) {
+    Scene scene;
+    addBox(scene, {5, 5, 5}, addMaterial(scene, lambert(0.5f)));
+    const RayScene rays(scene);
+    constexpr float near_m = 1;
+    EXPECT_TRUE(chosenInTheOpen(rays, {0, 0, 0}, near_m, 0.17f));
+    EXPECT_FALSE(chosenInTheOpen(rays, {0, 0, 0}, near_m, 0.21f));
+    EXPECT_TRUE(chosenInTheOpen(rays, {4.5f, 0, 0}, near_m, 0.99f));
+    EXPECT_FALSE(chosenInTheOpen(rays, {6, 0, 0}, near_m, 0));      // outside
+    EXPECT_FALSE(chosenInTheOpen(rays, {4.98f, 0, 0}, near_m, 0));  // 2 cm from a wall
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -1,0 +1,62 @@
+// Where probes may stand: how places are spread, and in which order they are looked at.
+#include <bake/test_scenes.h>
+#include <gtest/gtest.h>
+#include <probes/sites.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace dimmer::cook::test {
+namespace {
+
+TEST(Sites, AnyFirstPartIsSpreadOverAllBlocks) {
+    const std::vector<SiteBlock> blocks = {{std::vector<glm::vec3>(1000), 1},
+                                           {std::vector<glm::vec3>(100), 1},
+                                           {{}, 1},
+                                           {std::vector<glm::vec3>(10), 1},
+                                           {std::vector<glm::vec3>(3), 1}};
+    const std::vector<SiteRow> order = siteOrder(blocks);
+    ASSERT_EQ(order.size(), 1113u);
+    std::vector<size_t> seen(blocks.size());
+    for (size_t i = 0; i < order.size(); ++i) {
+        EXPECT_EQ(order[i].row, seen[order[i].block]++);  // every row once, in its block's order
+        if (i >= 1110) {
+            EXPECT_EQ(order[i].block, 4u);  // the corners
+            continue;
+        }
+        // As many of each block as of all, but that each of the three begins with a place.
+        for (size_t b = 0; b < 4; ++b)
+            EXPECT_NEAR(static_cast<double>(seen[b]), static_cast<double>(blocks[b].places_m.size() * (i + 1)) / 1110,
+                        3)
+                << i << " " << b;
+    }
+    EXPECT_TRUE(siteOrder({}).empty());
+}
+
+// A hall of 24 m each way with a probe for each 8 m3, and so near its walls within 1 m. At distance d from them lie
+// 24 (12 - d)^2 m2. Rays see walls up to a tenth too far, which takes a tenth of what is far away at most.
+TEST(Sites, StandMoreCloselyNearSurfaces) {
+    Scene scene;
+    addBox(scene, {12, 12, 12}, addMaterial(scene, lambert(0.5f)));
+    const RayScene rays(scene);
+    const auto far_share = [&](bool uniform) {
+        const auto choice = chooseSites(rays, {.probes_max = 1728, .sites = 8, .uniform = uniform}, nullptr);
+        EXPECT_TRUE(choice);
+        const std::vector<glm::vec3>& places = choice->blocks[0].places_m;
+        EXPECT_EQ(places.size(), 13824u);
+        const auto far = std::ranges::count_if(places, [](glm::vec3 p) {
+            return 12 - std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 2;
+        });
+        return static_cast<double>(far) / static_cast<double>(places.size());
+    };
+    EXPECT_NEAR(far_share(true), std::pow(10.0 / 12, 3), 0.015);  // three standard errors
+    const double near_walls = (std::pow(12, 3) - std::pow(11, 3)) / 3;
+    const auto thinned = [](double d) { return 144 * std::log(d) - 24 * d + d * d / 2; };
+    const double between = thinned(2) - thinned(1), beyond = thinned(12) - thinned(2);
+    const double expected = beyond / (near_walls + between + beyond);  // of (12 - d)^2 min(1, 1 / d)
+    EXPECT_LT(far_share(false), expected + 0.015);
+    EXPECT_GT(far_share(false), expected * 0.9 - 0.015);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
