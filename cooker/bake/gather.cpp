@@ -34,7 +34,7 @@ Gathered::Weights Gathered::weightsOf(glm::vec3 direction_tangent) {
 ProbeLight::Weights ProbeLight::weightsOf(glm::vec3 d) {
     const auto y = sphericalHarmonics({d.x, d.y, d.z});
     Weights weights;
-    for (size_t i = 0; i < weights.size(); ++i) weights[i] = y[i / 3];
+    for (size_t k = 0; k < y.size(); ++k) weights[3 * k] = weights[3 * k + 1] = weights[3 * k + 2] = y[k];
     return weights;
 }
 
@@ -65,6 +65,13 @@ glm::vec3 ProbeLight::irradiance(glm::vec3 n) const {
     return sum;
 }
 
+// What a ray's radiance counts for in the terms of the first aims, once one has asked (a bit each): many share one.
+struct Gatherer::AimShares {
+    AimShares() {}  // most rays ask for none: not even zeros
+    uint32_t asked = 0;
+    std::array<float, 16> of_aim;
+};
+
 template <class Light>
 struct Gatherer::Ray {
     using Intake = typename Light::Intake;
@@ -81,9 +88,8 @@ struct Gatherer::Ray {
     uint32_t aim;       // whose ray this is, as DoorAims::of_term has it; 0: a ray by the intake
     uint32_t i, point;  // in this gather; of the receiver
     glm::vec3 origin, world, tangent;
+    AimShares& shares;
     typename Light::Weights weights = Light::weightsOf(tangent);
-    // Of the first aims, once a term has asked: many terms share one.
-    mutable std::array<float, 16> share_of_aim{};
 };
 
 TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
@@ -116,7 +122,9 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         const TangentFrame frame = frameOf(origin);
         const glm::vec3 d = Light::Intake::direction(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const Ray<Light> ray{from, options, outgoing, sum, links, aims, 0, i, point, origin.position_m, world, d};
+        AimShares shares;
+        const Ray<Light> ray{from, options, outgoing,          sum,   links, aims,  0,
+                             i,    point,   origin.position_m, world, d,     shares};
         if (known && end == RayEnd::sky)
             takeSky(ray, free_path);
         else if (known)
@@ -160,8 +168,9 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
         const glm::vec3 world = guide.sample(u.z, {u.x, u.y});
         const glm::vec3 d = toTangent(origin, world);
         if (!(Light::Intake::weight(d) > 0)) continue;
+        AimShares shares;
         follow<Light>({from, options, outgoing, sum, nullptr, aims, static_cast<uint32_t>(a + 1), options.rays + i,
-                       point, origin.position_m, world, d},
+                       point, origin.position_m, world, d, shares},
                       seed + index);
     }
 }
@@ -209,12 +218,14 @@ float Gatherer::shareOf(const Ray<Light>& ray, uint32_t path, uint32_t term) con
     if (ray.aim != 0 && ray.aim != aim) return 0;
     if (aim == 0) return alone;
     const uint32_t index = aim - 1;
-    if (index < ray.share_of_aim.size() && ray.share_of_aim[index] > 0) return ray.share_of_aim[index];
+    const uint32_t bit = index < ray.shares.of_aim.size() ? 1u << index : 0;
+    if (ray.shares.asked & bit) return ray.shares.of_aim[index];
     const Guide& guide = ray.aims.all[index].from_point[ray.point];
     if (guide.empty()) return alone;
     const float by_aim = static_cast<float>(aimed_rays) * guide.pdf(ray.world);
     const float share = Light::Intake::weight(ray.tangent) / (ray.density(path) + by_aim);
-    if (index < ray.share_of_aim.size()) ray.share_of_aim[index] = share;
+    if (bit) ray.shares.of_aim[index] = share;
+    ray.shares.asked |= bit;
     return share;
 }
 

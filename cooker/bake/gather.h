@@ -216,6 +216,7 @@ class Gatherer {
     const ModelReceivers& models() const { return models_; }
 
    private:
+    struct AimShares;
     template <class Light>
     struct Ray;
     template <class Light>
