@@ -117,6 +117,13 @@ struct Baked {
 struct SiteBlock {
     std::vector<glm::vec3> places_m;
     uint32_t rays = 0;  // from each place
+    bool operator==(const SiteBlock&) const = default;
+};
+
+// The light of one group at the places of a block: what is active there; `term` counts the group's own.
+struct SiteBlockLight {
+    SiteBlock block;
+    Sparse<ProbeTermLight> light;
 };
 
 // All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
@@ -143,10 +150,10 @@ class GroupStore {
     // Places in the open of this geometry, of one kind: `what` tells it from others.
     virtual std::optional<std::vector<glm::vec3>> findPlaces(std::span<const float> what) = 0;
     virtual void keepPlaces(std::span<const float> what, std::span<const glm::vec3> places) = 0;
-    // A group's light at the places of each block, what is active there; `term` counts the group's own. No rows: not
-    // known.
-    virtual std::vector<Sparse<ProbeTermLight>> findSites(uint32_t group, std::span<const SiteBlock> blocks) = 0;
-    virtual void keepSites(uint32_t group, const SiteBlock& block, const Sparse<ProbeTermLight>& light) = 0;
+    // What earlier bakes know of a group's light in the open: of some of `blocks`, which count as reused when all are
+    // known, or of others.
+    virtual std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) = 0;
+    virtual void keepSites(uint32_t group, std::span<const SiteBlockLight> light) = 0;
     // Series::radiance, of the group's own terms: what light at new places is gathered from.
     virtual std::optional<SparseLight> findRadiance(uint32_t group) = 0;
     virtual void keepRadiance(uint32_t group, const SparseLight& radiance) = 0;

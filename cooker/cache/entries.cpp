@@ -238,35 +238,42 @@ std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
     return baked;
 }
 
-namespace {
-
-template <class Entry>
-std::vector<std::byte> rowsToBytes(const Sparse<Entry>& rows) {
+std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites) {
     ByteWriter out;
-    putRows(out, rows);
+    out.put(uint64_t{sites.size()});
+    for (const SiteBlockLight& s : sites) {
+        putAll(out, s.block.places_m);
+        out.put(s.block.rays);
+        putRows(out, s.light);
+    }
     return out.take();
 }
 
-template <class Entry>
-std::optional<Sparse<Entry>> rowsFromBytes(std::span<const std::byte> bytes) {
+std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::byte> bytes) {
     ByteReader in(bytes);
-    auto rows = getRows<Entry>(in);
-    return rows && in.atEnd() ? std::move(rows) : std::nullopt;
+    std::vector<SiteBlockLight> sites;
+    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) {
+        SiteBlockLight s;
+        getAll(in, s.block.places_m);
+        s.block.rays = in.get<uint32_t>();
+        auto light = getRows<ProbeTermLight>(in);
+        if (!light || light->rows() != s.block.places_m.size()) return {};
+        s.light = std::move(*light);
+        sites.push_back(std::move(s));
+    }
+    return in.atEnd() ? std::optional(std::move(sites)) : std::nullopt;
 }
 
-}  // namespace
-
-std::vector<std::byte> toBytes(const Sparse<ProbeTermLight>& light) {
-    return rowsToBytes(light);
-}
-std::optional<Sparse<ProbeTermLight>> probesFromBytes(std::span<const std::byte> bytes) {
-    return rowsFromBytes<ProbeTermLight>(bytes);
-}
 std::vector<std::byte> toBytes(const SparseLight& radiance) {
-    return rowsToBytes(radiance);
+    ByteWriter out;
+    putRows(out, radiance);
+    return out.take();
 }
+
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes) {
-    return rowsFromBytes<TermLight>(bytes);
+    ByteReader in(bytes);
+    auto light = getRows<TermLight>(in);
+    return light && in.atEnd() ? std::move(light) : std::nullopt;
 }
 
 }  // namespace dimmer::cook

@@ -188,10 +188,6 @@ Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> 
     return KeyBuilder("rays").add(scene).add(kind).addArray(places).finish();
 }
 
-Key sitesKey(const Key& group, const SiteBlock& block) {
-    return KeyBuilder("sites").add(group).addArray(std::span<const glm::vec3>(block.places_m)).add(block.rays).finish();
-}
-
 Key placesKey(const Key& scene, std::span<const float> what) {
     return KeyBuilder("places").add(scene).addArray(what).finish();
 }

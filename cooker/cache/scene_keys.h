@@ -35,9 +35,6 @@ Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene);
 // Of some rays, from `places` where they start from no receivers.
 Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> places);
 
-// A group's light at the places of a block. `group`: groupKey.
-Key sitesKey(const Key& group, const SiteBlock& block);
-
 // Places in the open.
 Key placesKey(const Key& scene, std::span<const float> what);
 

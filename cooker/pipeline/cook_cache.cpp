@@ -150,30 +150,26 @@ void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
     keep(grid_kind, key, cook::toBytes(grid));
 }
 
-std::vector<Sparse<ProbeTermLight>> CookCache::findSites(const std::string& what, const Key& group,
-                                                         std::span<const SiteBlock> blocks) {
-    std::vector<Sparse<ProbeTermLight>> light(blocks.size());
-    size_t asked = 0, missing = 0;
-    Find worst = Find::Missing;
-    for (size_t b = 0; b < blocks.size(); ++b) {
-        if (blocks[b].places_m.empty()) continue;
-        ++asked;
-        const Entry entry = look(sites_kind, sitesKey(group, blocks[b]));
-        if (entry.find == Find::Hit) light[b] = probesFromBytes(entry.bytes).value_or(Sparse<ProbeTermLight>{});
-        if (entry.find == Find::Damaged) worst = Find::Damaged;
-        missing += light[b].rows() == 0;
-    }
+std::vector<SiteBlockLight> CookCache::findSites(const std::string& what, const Key& key,
+                                                 std::span<const SiteBlock> blocks) {
+    const Entry entry = look(sites_kind, key);
+    std::vector<SiteBlockLight> known;
+    if (entry.find == Find::Hit) known = sitesFromBytes(entry.bytes).value_or(std::vector<SiteBlockLight>{});
+    const auto is_known = [&](const SiteBlock& block) {
+        return block.places_m.empty() || std::ranges::find(known, block, &SiteBlockLight::block) != known.end();
+    };
+    const auto new_blocks = blocks.size() - static_cast<size_t>(std::ranges::count_if(blocks, is_known));
     std::string why;
-    if (worst == Find::Damaged || missing == asked)
-        why = whyMissing(worst, partsOfGroup(what));
-    else if (missing > 0)
-        why = fmt::format("{} of {} groups of places are new", missing, asked);
-    lines_.push_back({"light at probe places: " + what, missing == 0, missing == 0 ? "" : why});
-    return light;
+    if (known.empty())
+        why = whyMissing(entry.find, partsOfGroup(what));
+    else if (new_blocks > 0)
+        why = fmt::format("{} of {} groups of places are new", new_blocks, blocks.size());
+    lines_.push_back({"light at probe places: " + what, new_blocks == 0, why});
+    return known;
 }
 
-void CookCache::keepSites(const Key& key, const Sparse<ProbeTermLight>& light) {
-    keep(sites_kind, key, cook::toBytes(light));
+void CookCache::keepSites(const Key& key, std::span<const SiteBlockLight> sites) {
+    keep(sites_kind, key, cook::toBytes(sites));
 }
 
 std::optional<std::vector<glm::vec3>> CookCache::findPlaces(const Key& key) {
@@ -234,7 +230,7 @@ std::optional<BakedGrid> CachedGroups::findGrid() {
     return cache_.findGrid(grid_, parts);
 }
 
-std::vector<Sparse<ProbeTermLight>> CachedGroups::findSites(uint32_t group, std::span<const SiteBlock> blocks) {
+std::vector<SiteBlockLight> CachedGroups::findSites(uint32_t group, std::span<const SiteBlock> blocks) {
     return cache_.findSites(describeGroup(scene_, group), keys_[group], blocks);
 }
 

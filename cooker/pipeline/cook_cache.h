@@ -46,10 +46,8 @@ class CookCache {
     // `parts`: of all groups, what the grid depends on.
     std::optional<BakedGrid> findGrid(const Key& key, const std::vector<std::string>& parts);
     void keepGrid(const Key& key, const BakedGrid& grid);
-    // `group`: its key.
-    std::vector<Sparse<ProbeTermLight>> findSites(const std::string& what, const Key& group,
-                                                  std::span<const SiteBlock> blocks);
-    void keepSites(const Key& key, const Sparse<ProbeTermLight>& light);
+    std::vector<SiteBlockLight> findSites(const std::string& what, const Key& key, std::span<const SiteBlock> blocks);
+    void keepSites(const Key& key, std::span<const SiteBlockLight> sites);
     std::optional<std::vector<glm::vec3>> findPlaces(const Key& key);
     void keepPlaces(const Key& key, std::span<const glm::vec3> places);
     std::optional<SparseLight> findRadiance(const Key& key);
@@ -96,9 +94,9 @@ class CachedGroups final : public GroupStore {
     void keepPlaces(std::span<const float> what, std::span<const glm::vec3> places) override {
         cache_.keepPlaces(placesKey(rays_, what), places);
     }
-    std::vector<Sparse<ProbeTermLight>> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
-    void keepSites(uint32_t group, const SiteBlock& block, const Sparse<ProbeTermLight>& light) override {
-        cache_.keepSites(sitesKey(keys_[group], block), light);
+    std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
+    void keepSites(uint32_t group, std::span<const SiteBlockLight> sites) override {
+        cache_.keepSites(keys_[group], sites);
     }
     std::optional<SparseLight> findRadiance(uint32_t group) override { return cache_.findRadiance(keys_[group]); }
     void keepRadiance(uint32_t group, const SparseLight& radiance) override {

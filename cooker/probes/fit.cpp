@@ -38,8 +38,8 @@ class Solver {
 
     void solve(std::span<const FitValue> targets, float tolerance, std::span<FitValue> values) const {
         const size_t n = values.size();
-        Vector x, residual(n), image(n), direction(n);
-        for (const FitValue& value : values) x.emplace_back(value);
+        Vector x(n), residual(n), image(n), direction(n);
+        for (size_t i = 0; i < n; ++i) x[i] = Lanes(values[i]);
         for (size_t s = 0; s < sites_.size(); ++s) {
             Lanes missing(targets[s]);
             accumulate(missing, sites_[s], x, -1);

@@ -44,6 +44,7 @@ class Placer {
           rays_(rays),
           limit_(choice.probes_max),
           free_volume_m3_(choice.free_volume_m3),
+          order_(siteOrder(choice.blocks)),
           trial_(rays, choice, states, settings),
           places_(trial_.places()),
           near_(coarse_spacing_m) {}
@@ -70,10 +71,12 @@ class Placer {
 
     // Adds probes until they are as many as may be, or nothing is wrong.
     Expected<void> grow() {
+        bool at_all = false;  // once few places show nothing wrong
         for (uint32_t round = 0; round < grow_rounds_max && probes_.places.size() < limit_; ++round) {
             const bool grown = refine();
             if (!grown && trial_.looksAtAll()) break;
-            if (auto ok = grown ? buildToGrow() : build(); !ok) return ok;
+            at_all = at_all || !grown;
+            if (auto ok = at_all ? build() : buildToGrow(); !ok) return ok;
         }
         progress_.advance(1);
         return trial_.looksAtAll() ? Expected<void>{} : build();
@@ -217,8 +220,13 @@ class Placer {
         return true;
     }
 
+    // From places all over the level before those near lamps, which would crowd there.
     void placeCoarse() {
-        for (uint32_t i = 0; i < trial_.placeCount() && probes_.places.size() < limit_; ++i) add(i, coarse_spacing_m);
+        std::vector<uint32_t> by_block(trial_.placeCount());
+        std::iota(by_block.begin(), by_block.end(), 0u);
+        std::ranges::stable_sort(by_block, {}, [&](uint32_t i) { return order_[i].block; });
+        for (const uint32_t i : by_block)
+            if (probes_.places.size() < limit_) add(i, coarse_spacing_m);
     }
 
     // The sites nearest to the points of a lattice, as many points as probes may be: as even as sites are.
@@ -280,6 +288,7 @@ class Placer {
     const RayScene& rays_;
     size_t limit_;  // of probes
     double free_volume_m3_;
+    const std::vector<SiteRow> order_;  // of places_
     TrialGrid trial_;
     const std::vector<glm::vec3>& places_;
     uint32_t level_ = 0;

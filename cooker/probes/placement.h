@@ -18,10 +18,10 @@ struct Placement {
 };
 
 // Of `states`, the light at the places of `choice`. A few places, far apart, become probes; then, round after round,
-// the grid is asked for the light at all others, and in the tetrahedra that are wrong the most the worst place becomes
-// a probe too, until none is wrong by more than the tolerance, or the probes are as many as may be. Then those that do
-// least are exchanged for others, and where they are few, single ones move. Probes that see each other keep their
-// distance. Deterministic.
+// the grid is asked for the light at all others (at fewer while a large grid still has few probes), and in the
+// tetrahedra that are wrong the most the worst place becomes a probe too, until none is wrong by more than the
+// tolerance, or the probes are as many as may be. Then those that do least are exchanged for others, and where they are
+// few, single ones move. Probes that see each other keep their distance. Deterministic.
 Expected<Placement> placeProbes(const RayScene& rays, const SiteChoice& choice, std::span<const FitValue> states,
                                 const GridSettings& settings, Progress& progress);
 

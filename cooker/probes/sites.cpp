@@ -21,7 +21,7 @@ constexpr double density_max_per_m3 = 1;
 constexpr double small_sites_per_probe = 40, small_sites = 4000;
 constexpr double many_sites = 60000, sites_per_probe_affordable = 5;
 constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
-constexpr uint32_t tries_per_site = 16;
+constexpr uint32_t tries_per_site = 64;
 // Half of the places are near a lamp, where light changes over a hand's breadth: nearer than this many times the
 // spacing of the others, so that what lies around that is not left to chance.
 constexpr double share_near_lamps = 0.5;
@@ -29,7 +29,7 @@ constexpr double lamp_reach_spacings = 2.2;
 constexpr float lamp_reach_min_m = 0.8f;
 // Light changes over lengths like the distance to surfaces (Ward and Heckbert 1992), and what asks for it moves near
 // them: places farther off than this many times the mean spacing of probes become rarer.
-constexpr double near_spacings = 0.5;
+constexpr double near_spacings = 0.8;
 constexpr uint32_t rarity_seed = 0x2c1b3c6du;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
@@ -58,7 +58,7 @@ class Chooser {
         for (const glm::vec3 lamp : lamps_)
             if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
                 out_.blocks.push_back({around(lamp, count), rays});
-        if (out_.places().empty()) {
+        if (std::ranges::all_of(out_.blocks, [](const SiteBlock& block) { return block.places_m.empty(); })) {
             out_.blocks.clear();
             return std::move(out_);
         }
@@ -86,8 +86,9 @@ class Chooser {
         const double most = std::max(many_sites, sites_per_probe_affordable * probes);
         const double wanted = std::clamp(settings_.sites * probes, least, most);
         const double spacing_m = std::cbrt(out_.free_volume_m3 / ((1 - share_near_lamps) * wanted));
-        near_m_ = settings_.uniform ? far_away_m
-                                    : static_cast<float>(near_spacings * std::cbrt(out_.free_volume_m3 / probes));
+        near_m_ = settings_.uniform || free.empty()
+                      ? far_away_m
+                      : static_cast<float>(near_spacings * std::cbrt(out_.free_volume_m3 / probes));
         lamp_reach_m_ = std::max(lamp_reach_min_m, static_cast<float>(lamp_reach_spacings * spacing_m));
         return static_cast<uint32_t>(wanted);
     }
@@ -96,7 +97,8 @@ class Chooser {
         const glm::vec3 low = rays_.boundsMin(), size = rays_.boundsMax() - low;
         return low + size * glm::vec3(radicalInverse(2, i + 1), radicalInverse(3, i + 1), radicalInverse(5, i + 1));
     }
-    // Uniform in the distance, so that each shell around a lamp gets as many: light there falls with its square.
+    // Uniform in the distance, so that each shell around a lamp gets as many (but for what is far from surfaces): light
+    // there falls with its square.
     glm::vec3 nearLamp(glm::vec3 lamp_m, uint32_t i) const {
         const glm::vec3 u = sequence3d(i, site_seed);
         return lamp_m + lamp_reach_m_ * u.z * uniformSphereDirection({u.x, u.y});
@@ -324,7 +326,7 @@ std::vector<SiteRow> siteOrder(std::span<const SiteBlock> blocks) {
     for (size_t b = 0; b + 1 < blocks.size(); ++b)
         for (size_t i = 0; i < blocks[b].places_m.size(); ++i) order.push_back({b, i});
     std::ranges::stable_sort(order, {}, [&](const SiteRow& r) {
-        return static_cast<double>(r.row) / static_cast<double>(blocks[r.block].places_m.size());
+        return (static_cast<double>(r.row) + 0.5) / static_cast<double>(blocks[r.block].places_m.size());
     });
     for (size_t i = 0; i < blocks.back().places_m.size(); ++i) order.push_back({blocks.size() - 1, i});
     return order;
@@ -344,12 +346,12 @@ SiteLight::SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, 
     : blocks_(blocks),
       paths_(paths),
       store_(store),
-      light_(paths.groupCount(), std::vector<Sparse<ProbeTermLight>>(blocks.size())) {
-    for (uint32_t g = 0; store && g < paths.groupCount(); ++g) {
-        auto known = store->findSites(g, blocks);
-        for (size_t b = 0; b < blocks.size(); ++b)
-            if (fits(known[b], blocks[b].places_m.size(), paths.termsOf(g).size())) light_[g][b] = std::move(known[b]);
-    }
+      light_(paths.groupCount(), std::vector<SiteBlockLight>(blocks.size())) {
+    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
+        for (SiteBlockLight& known : store->findSites(g, blocks))
+            if (const auto block = std::ranges::find(blocks, known.block);
+                block != blocks.end() && fits(known.light, block->places_m.size(), paths.termsOf(g).size()))
+                light_[g][static_cast<size_t>(block - blocks.begin())] = std::move(known);
 }
 
 std::vector<uint8_t> SiteLight::asked() const {
@@ -363,7 +365,7 @@ std::vector<uint8_t> SiteLight::asked() const {
 // Groups, ascending.
 std::vector<uint32_t> SiteLight::missingAt(size_t block) const {
     std::vector<uint32_t> groups;
-    for (uint32_t g = 0; g < light_.size(); ++g)
+    for (uint32_t g = 0; g < light_.size() && !blocks_[block].places_m.empty(); ++g)
         if (isMissing(g, block)) groups.push_back(g);
     return groups;
 }
@@ -416,6 +418,8 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
         rays.keep();
         share(rows, blocks, groups);
     }
+    for (uint32_t g = 0; store_ && g < light_.size(); ++g)
+        if (asked_groups[g]) store_->keepSites(g, light_[g]);
     return traced;
 }
 
@@ -423,10 +427,7 @@ void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks,
     for (const size_t b : blocks) {
         const auto here = rows.first(blocks_[b].places_m.size());
         rows = rows.subspan(here.size());
-        for (const uint32_t g : groups) {
-            light_[g][b] = ofGroup(here, g);
-            if (store_) store_->keepSites(g, blocks_[b], light_[g][b]);
-        }
+        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g)};
     }
 }
 
@@ -437,7 +438,7 @@ Sparse<ProbeTermLight> SiteLight::take() {
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (uint32_t g = 0; g < paths_.groupCount(); ++g)
-                for (const ProbeTermLight& l : light_[g][order[i].block].row(order[i].row))
+                for (const ProbeTermLight& l : light_[g][order[i].block].light.row(order[i].row))
                     row.push_back({paths_.termsOf(g)[l.term], l.light, 0, 0});
             std::ranges::sort(row, {}, &ProbeTermLight::term);
             emit(std::span<const ProbeTermLight>(row));

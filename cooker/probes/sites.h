@@ -15,7 +15,7 @@ namespace dimmer::cook {
 
 struct SiteChoice {
     // All over the level; around each lamp; the free ones of the corners of the grid's box. A block depends on
-    // geometry, its own lamp and the settings alone. Empty: nothing is free.
+    // geometry, its own lamp, how many there are and the settings alone. Empty: nothing is free.
     std::vector<SiteBlock> blocks;
     std::vector<bool> corner_free;  // which of the box's 8 corners the last block has
     size_t probes_max = 0;          // as the settings and the level's size have it
@@ -55,12 +55,12 @@ class SiteLight {
     std::vector<uint32_t> missingAt(size_t block) const;
     void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
     Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group) const;
-    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].rows() == 0; }
+    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].light.rows() == 0; }
 
     std::span<const SiteBlock> blocks_;
     const DoorPaths& paths_;
     GroupStore* store_;
-    std::vector<std::vector<Sparse<ProbeTermLight>>> light_;  // per group, per block; no rows: missing
+    std::vector<std::vector<SiteBlockLight>> light_;  // per group, per block; no rows: missing
 };
 
 // What placement looks at: all light together, then each half of the light sets, so that light which leaks from a set's

@@ -181,7 +181,8 @@ size_t TrialGrid::HashOfKey::operator()(const Key& key) const {
     return sum;
 }
 
-// Tetrahedra of earlier rounds keep what was found: by the sites that their probes are, and the corners.
+// Tetrahedra of earlier rounds keep what was found (from the places looked at then): by the sites that their probes
+// are, and the corners.
 TrialGrid::Key TrialGrid::keyOf(const Tetrahedron& t) const {
     const auto name = [&](uint32_t position) {
         return position < probes_.places.size()

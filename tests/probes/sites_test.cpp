@@ -33,7 +33,27 @@ TEST(Sites, AnyFirstPartIsSpreadOverAllBlocks) {
     EXPECT_TRUE(siteOrder({}).empty());
 }
 
-// A hall of 24 m each way with a probe for each 8 m3, and so near its walls within 1 m. At distance d from them lie
+TEST(Sites, ManyLampsDoNotComeBeforeTheRest) {
+    std::vector<SiteBlock> blocks(202, {std::vector<glm::vec3>(5), 1});
+    blocks[0].places_m.resize(1000);
+    const std::vector<SiteRow> order = siteOrder(blocks);
+    for (size_t i = 0; i < 100; ++i) EXPECT_EQ(order[i].block, 0u) << i;
+}
+
+// Less than one of 8,192 places of its box is in the open: of the first look, none. The lamp's own are.
+TEST(Sites, ASmallRoomInAVastLevelStillHasSome) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {2, 2, 2}, grey);
+    addSolid(scene, "far away", {300, 300, 300}, {1, 1, 1}, grey);
+    scene.lights.emplace_back().position_m = {0, 1, 0};
+    const auto choice = chooseSites(RayScene(scene), {.probes_max = 100, .sites = 8}, nullptr);
+    ASSERT_TRUE(choice);
+    ASSERT_EQ(choice->blocks.size(), 3u);
+    EXPECT_GT(choice->blocks[1].places_m.size(), 50u);
+}
+
+// A hall of 24 m each way with a probe for each 8 m3, and so near its walls within 1.6 m. At distance d from them lie
 // 24 (12 - d)^2 m2. Rays see walls up to a tenth too far, which takes a tenth of what is far away at most.
 TEST(Sites, StandMoreCloselyNearSurfaces) {
     Scene scene;
@@ -50,10 +70,11 @@ TEST(Sites, StandMoreCloselyNearSurfaces) {
         return static_cast<double>(far) / static_cast<double>(places.size());
     };
     EXPECT_NEAR(far_share(true), std::pow(10.0 / 12, 3), 0.015);  // three standard errors
-    const double near_walls = (std::pow(12, 3) - std::pow(11, 3)) / 3;
-    const auto thinned = [](double d) { return 144 * std::log(d) - 24 * d + d * d / 2; };
-    const double between = thinned(2) - thinned(1), beyond = thinned(12) - thinned(2);
-    const double expected = beyond / (near_walls + between + beyond);  // of (12 - d)^2 min(1, 1 / d)
+    constexpr double near_m = 1.6;
+    const double near_walls = (std::pow(12, 3) - std::pow(12 - near_m, 3)) / 3;
+    const auto thinned = [](double d) { return near_m * (144 * std::log(d) - 24 * d + d * d / 2); };
+    const double between = thinned(2) - thinned(near_m), beyond = thinned(12) - thinned(2);
+    const double expected = beyond / (near_walls + between + beyond);  // of (12 - d)^2 min(1, near / d)
     EXPECT_LT(far_share(false), expected + 0.015);
     EXPECT_GT(far_share(false), expected * 0.9 - 0.015);
 }
