@@ -197,8 +197,16 @@ TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
         for (json& node : level.document["nodes"])
             if (node.value("name", "") == "lamp3") node["translation"][0] = x;
     };
+    const auto placesKept = [&] {
+        return std::ranges::count_if(std::filesystem::directory_iterator(folder.path / "cache"), [](const auto& entry) {
+            return entry.path().filename().string().starts_with("places-");
+        });
+    };
+    const auto before = placesKept();
+    EXPECT_GT(before, 2);  // how much is free, all over the level, and around each lamp
     move(8.7);
     EXPECT_EQ(made(level), stages);
+    EXPECT_EQ(placesKept(), before + 1);  // around the lamp that moved
     for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache"))
         if (entry.path().filename().string().starts_with("radiance-")) std::filesystem::remove(entry.path());
     move(8.6);
