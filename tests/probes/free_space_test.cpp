@@ -60,8 +60,8 @@ TEST(FreeSpace, ADoorsFootDoesNotOpenWhatLiesBelowTheFloor) {
     EXPECT_TRUE(inTheOpen(rays, {0, 2, 0}));    // above it
 }
 
-// In the middle of a cube the nearest wall is 5 m off; 24 rays meet it within 5 / cos(25 degrees), as none of them is
-// farther than that from some axis.
+// In the middle of a cube the nearest wall is 5 m off; 24 rays meet it within 5 / cos(25 degrees), as one of them
+// is that near to an axis.
 TEST(FreeSpace, FarFromSurfacesPlacesAreChosenAsOftenAsTheyAreNear) {
     Scene scene;
     addBox(scene, {5, 5, 5}, addMaterial(scene, lambert(0.5f)));
