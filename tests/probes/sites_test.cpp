@@ -45,7 +45,7 @@ TEST(Sites, ASmallRoomInAVastLevelStillHasSome) {
     Scene scene;
     const uint32_t grey = addMaterial(scene, lambert(0.5f));
     addBox(scene, {2, 2, 2}, grey);
-    addSolid(scene, "far away", {300, 300, 300}, {1, 1, 1}, grey);
+    addQuad(scene, "far away", {300, 300, 300}, {0, 1, 0}, {0, 0, 1}, grey);  // all see its back
     scene.lights.emplace_back().position_m = {0, 1, 0};
     const auto choice = chooseSites(RayScene(scene), {.probes_max = 100, .sites = 8}, nullptr);
     ASSERT_TRUE(choice);
