@@ -94,7 +94,12 @@ struct Gatherer::Ray {
 
 TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
     if (point.face < unwrap_.frames.size()) return unwrap_.frames[point.face];
-    return point.face == no_face ? TangentFrame{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}} : receiverFrame(point.face);
+    if (point.face == no_face) return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    if (point.face >= first_receiver_face) return receiverFrame(point.face);
+    TangentFrame frame;
+    frame.normal = rays_.triangles()[(point.face & ~triangle_faces) / 2].normal * (point.face % 2 ? -1.0f : 1.0f);
+    orthonormalBasis(frame.normal, frame.tangent, frame.bitangent);
+    return frame;
 }
 
 glm::vec3 Gatherer::toTangent(const SamplePoint& point, glm::vec3 d) const {
@@ -102,7 +107,7 @@ glm::vec3 Gatherer::toTangent(const SamplePoint& point, glm::vec3 d) const {
     const auto in = [&](const TangentFrame& f) {
         return glm::vec3(glm::dot(d, f.tangent), glm::dot(d, f.bitangent), glm::dot(d, f.normal));
     };
-    return point.face < unwrap_.frames.size() ? in(unwrap_.frames[point.face]) : in(receiverFrame(point.face));
+    return point.face < unwrap_.frames.size() ? in(unwrap_.frames[point.face]) : in(frameOf(point));
 }
 
 template <class Light>

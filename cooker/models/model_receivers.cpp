@@ -61,27 +61,6 @@ NearNormals nearNormals(glm::vec3 n) {
     return {{edge(0), edge(1), edge(2)}, {1 - 2 * share[0], 1 - 2 * share[1], 1 - 2 * share[2]}};
 }
 
-struct NearProbes {
-    std::array<uint32_t, 8> number;  // within the model
-    std::array<float, 8> share;
-};
-
-NearProbes nearProbes(const SceneModel& model, glm::vec3 point_m) {
-    const glm::vec3 inside = glm::transpose(model.world_from_model) * (point_m - model.origin_m) - model.min_m;
-    const glm::vec3 last = glm::vec3(model.probes - 1u);
-    const glm::vec3 at = glm::clamp(inside / (model.max_m - model.min_m) * last, glm::vec3(0), last);
-    const glm::uvec3 low = glm::min(glm::uvec3(at), model.probes - 2u);
-    const glm::vec3 along = at - glm::vec3(low);
-    NearProbes near;
-    for (uint32_t corner = 0; corner < 8; ++corner) {
-        const glm::uvec3 step(corner & 1, corner >> 1 & 1, corner >> 2), cell = low + step;
-        near.number[corner] = cell.x + model.probes.x * (cell.y + model.probes.y * cell.z);
-        near.share[corner] = 1;
-        for (int i = 0; i < 3; ++i) near.share[corner] *= step[i] ? along[i] : 1 - along[i];
-    }
-    return near;
-}
-
 template <size_t count>
 uint32_t drawn(const std::array<uint32_t, count>& from, const std::array<float, count>& shares, float chance) {
     for (size_t i = 0; i + 1 < count; ++i)
@@ -154,6 +133,22 @@ std::vector<uint8_t> openAmong(const RayScene& rays, uint32_t model, std::span<c
 }
 
 }  // namespace
+
+NearProbes nearProbes(const SceneModel& model, glm::vec3 point_m) {
+    const glm::vec3 inside = glm::transpose(model.world_from_model) * (point_m - model.origin_m) - model.min_m;
+    const glm::vec3 last = glm::vec3(model.probes - 1u);
+    const glm::vec3 at = glm::clamp(inside / (model.max_m - model.min_m) * last, glm::vec3(0), last);
+    const glm::uvec3 low = glm::min(glm::uvec3(at), model.probes - 2u);
+    const glm::vec3 along = at - glm::vec3(low);
+    NearProbes near;
+    for (uint32_t corner = 0; corner < 8; ++corner) {
+        const glm::uvec3 step(corner & 1, corner >> 1 & 1, corner >> 2), cell = low + step;
+        near.number[corner] = cell.x + model.probes.x * (cell.y + model.probes.y * cell.z);
+        near.share[corner] = 1;
+        for (int i = 0; i < 3; ++i) near.share[corner] *= step[i] ? along[i] : 1 - along[i];
+    }
+    return near;
+}
 
 TangentFrame receiverFrame(uint32_t face) {
     TangentFrame frame;

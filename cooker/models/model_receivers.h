@@ -15,6 +15,13 @@ namespace dimmer::cook {
 
 inline constexpr size_t receiver_normals = 18;
 
+// The probes that a place of a model reads, and how much of each.
+struct NearProbes {
+    std::array<uint32_t, 8> number;  // within the model
+    std::array<float, 8> share;
+};
+NearProbes nearProbes(const SceneModel& model, glm::vec3 point_m);
+
 // Where the light of a model's probes is gathered.
 struct ProbePlaces {
     // Per probe: a little nearer to the middle of the model than it stands, as far as it takes to be in the open.
@@ -70,5 +77,7 @@ class ModelReceivers {
 // Faces from here on are not of the charts: the normals of receivers, and no_face.
 inline constexpr uint32_t first_receiver_face = 0xffffff00u;
 TangentFrame receiverFrame(uint32_t face);
+// Faces from here on, below those, are the level's triangles, of no chart: 2 * triangle, and 1 for its back.
+inline constexpr uint32_t triangle_faces = 0x80000000u;
 
 }  // namespace dimmer::cook

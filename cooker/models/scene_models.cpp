@@ -138,6 +138,21 @@ void listModels(Scene& scene, const ModelSettings& settings) {
     }
 }
 
+std::optional<ModelShape> shapeOf(const Scene& scene, const SceneModel& model) {
+    if (model.meshes.empty() || !model.is_instance_shape) return {};
+    ModelShape shape;
+    shape.gltf_mesh = scene.meshes[model.meshes[0]].gltf_mesh;
+    if (shape.gltf_mesh < 0) return {};
+    constexpr float tenth_of_a_permille = 1e4f;
+    for (int i = 0; i < 3; ++i) shape.scale[static_cast<size_t>(i)] = std::lround(model.scale[i] * tenth_of_a_permille);
+    for (const uint32_t m : model.meshes) {
+        shape.materials.push_back(scene.meshes[m].triangle_materials);
+        shape.vertices.push_back(scene.meshes[m].positions_m.size());
+        shape.light_sets.push_back(scene.meshes[m].light_set);
+    }
+    return shape;
+}
+
 glm::vec3 probePosition(const SceneModel& model, uint32_t number) {
     const glm::uvec3 n = model.probes, at(number % n.x, number / n.x % n.y, number / n.x / n.y);
     return model.world(model.min_m) + stepOf(model, 0) * static_cast<float>(at.x) +

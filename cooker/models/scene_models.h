@@ -4,6 +4,8 @@
 #include <pack/grid_data.h>
 #include <scene/scene.h>
 
+#include <array>
+#include <optional>
 #include <vector>
 
 namespace dimmer::cook {
@@ -20,6 +22,18 @@ struct ModelSettings {
 
 // Fills Scene::models: what stands and has a grid, what moves, and the empty places for things that move.
 void listModels(Scene& scene, const ModelSettings& settings);
+
+// What makes nodes' models alike but for where they stand: the file's mesh, its size and what it is made of.
+struct ModelShape {
+    int gltf_mesh = -1;
+    std::array<long, 3> scale{};  // in tenths of a permille
+    std::vector<std::vector<uint32_t>> materials;
+    std::vector<size_t> vertices;
+    std::vector<std::optional<uint32_t>> light_sets;
+    auto operator<=>(const ModelShape&) const = default;
+};
+// None where a model is like no other.
+std::optional<ModelShape> shapeOf(const Scene& scene, const SceneModel& model);
 
 // Per model that stands, in the order of Scene::models; numbers of probes begin at `first_probe`.
 std::vector<LocalGrid> localGrids(const Scene& scene, uint32_t first_probe);

@@ -1,12 +1,14 @@
 #include <models/self_visibility.h>
 
 #include <bake/sampling.h>
+#include <models/scene_models.h>
 #include <probes/spherical_harmonics.h>
 #include <trace/ray_scene.h>
 
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <map>
 
 namespace dimmer::cook {
 namespace {
@@ -155,6 +157,17 @@ class TransferTracer {
 
 ModelTransfers selfVisibility(const Scene& scene, const SceneModel& model) {
     return TransferTracer(scene, model).run();
+}
+
+void findTransfers(Scene& scene) {
+    std::map<ModelShape, std::shared_ptr<const ModelTransfers>> known;
+    for (SceneModel& model : scene.models) {
+        if (model.meshes.empty()) continue;
+        const auto shape = shapeOf(scene, model);
+        std::shared_ptr<const ModelTransfers> own, &transfers = shape ? known[*shape] : own;
+        if (!transfers) transfers = std::make_shared<const ModelTransfers>(selfVisibility(scene, model));
+        model.transfers = transfers;
+    }
 }
 
 }  // namespace dimmer::cook

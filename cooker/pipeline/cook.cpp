@@ -12,6 +12,7 @@
 #include <cluster/cluster.h>
 #include <encode/encode.h>
 #include <models/scene_models.h>
+#include <models/self_visibility.h>
 #include <pipeline/budget.h>
 #include <pipeline/level_meshes.h>
 #include <pipeline/model_meshes.h>
@@ -270,6 +271,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     {
         Stopwatch watch(stats, "charts");
         if (auto ok = chart(scene, profile, *quality, progress, cache, level); !ok) return std::unexpected(ok.error());
+        findTransfers(scene);
         const auto buried = warningsOfBuriedLights(*level.rays);
         stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
         progress.advance(1);

@@ -1,6 +1,6 @@
 #include <pipeline/model_meshes.h>
 
-#include <models/self_visibility.h>
+#include <models/scene_models.h>
 #include <pack/mesh_codec.h>
 #include <pipeline/level_meshes.h>
 #include <probes/spherical_harmonics.h>
@@ -47,7 +47,7 @@ using MaterialPartKey =
     std::pair<uint32_t, std::optional<uint32_t>>;  // material, and the light set that dims its emission
 
 std::map<MaterialPartKey, MaterialPart> partsOf(const Scene& scene, const SceneModel& model) {
-    const ModelTransfers transfers = selfVisibility(scene, model);
+    const ModelTransfers& transfers = *model.transfers;
     std::map<MaterialPartKey, MaterialPart> parts;
     for (uint32_t m = 0; m < model.meshes.size(); ++m) {
         const SceneMesh& mesh = scene.meshes[model.meshes[m]];
@@ -68,29 +68,14 @@ class ModelMeshes {
 
     // First mesh and their number.
     std::pair<uint32_t, uint32_t> of(const SceneModel& model) {
-        const bool shared = model.is_instance_shape && scene_.meshes[model.meshes[0]].gltf_mesh >= 0;
-        if (!shared) return add(model);
-        const auto [it, fresh] = shared_.try_emplace(keyOf(model));
+        const auto shape = shapeOf(scene_, model);
+        if (!shape) return add(model);
+        const auto [it, fresh] = shared_.try_emplace(*shape);
         if (fresh) it->second = add(model);
         return it->second;
     }
 
    private:
-    // What makes two nodes' models alike: the file's mesh, its size, what it is made of.
-    using Key =
-        std::tuple<int, std::array<long, 3>, std::vector<std::vector<uint32_t>>, std::vector<std::optional<uint32_t>>>;
-    Key keyOf(const SceneModel& model) const {
-        Key key{scene_.meshes[model.meshes[0]].gltf_mesh, {}, {}, {}};
-        constexpr float tenth_of_a_permille = 1e4f;
-        for (int i = 0; i < 3; ++i)
-            std::get<1>(key)[static_cast<size_t>(i)] = std::lround(model.scale[i] * tenth_of_a_permille);
-        for (const uint32_t m : model.meshes) {
-            std::get<2>(key).push_back(scene_.meshes[m].triangle_materials);
-            std::get<3>(key).push_back(scene_.meshes[m].light_set);
-        }
-        return key;
-    }
-
     std::pair<uint32_t, uint32_t> add(const SceneModel& model) {
         const auto first = static_cast<uint32_t>(pack_.model_meshes.size());
         for (const auto& [key, part] : partsOf(scene_, model)) pack_.model_meshes.push_back(meshOf(model, key, part));
@@ -126,7 +111,7 @@ class ModelMeshes {
     const Scene& scene_;
     std::span<const glm::vec3> emission_cd_m2_;
     PackData& pack_;
-    std::map<Key, std::pair<uint32_t, uint32_t>> shared_;
+    std::map<ModelShape, std::pair<uint32_t, uint32_t>> shared_;
 };
 
 // As modelNormal() unfolds it.

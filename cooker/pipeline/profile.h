@@ -50,7 +50,7 @@ struct Profile {
     GridMode global_grid = GridMode::Auto;
     uint32_t probes_max = 20000;        // of the global grid; 0: no grid
     float global_min_spacing_m = 0.3f;  // between them
-    float local_spacing_m = 1.5f;       // between the probes of a model's grid, at most
+    float local_spacing_m = 0.4f;       // between the probes of a model's grid, at most
     uint32_t local_probes_max = 64;     // of one model's grid; above, they stand further apart
     Quality draft, preview, final;
 

@@ -13,8 +13,9 @@ constexpr uint32_t rays_per_texel_ray = 4;
 
 }  // namespace
 
-ProbeGather::ProbeGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
-                         const BakeSettings& settings)
+template <class Light>
+ReceiverGather<Light>::ReceiverGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                                      const BakeSettings& settings)
     : gatherer_(gatherer),
       lights_(lights),
       series_(series),
@@ -25,17 +26,16 @@ ProbeGather::ProbeGather(const Gatherer& gatherer, const LightGrid& lights, cons
       sum_(gatherer_.paths().termCount()),
       direct_(gatherer_.paths().termCount()),
       stored_(gatherer_.paths().termCount()) {
-    options_.rays_max *= rays_per_texel_ray;
+    if (std::is_same_v<Light, ProbeLight>) options_.rays_max *= rays_per_texel_ray;
 }
 
-uint64_t ProbeGather::gather(glm::vec3 position_m, uint32_t id, std::span<const uint8_t> groups, uint32_t ignored,
-                             std::vector<ProbeTermLight>& row) {
-    const SamplePoint point{position_m, no_face};
-    const GatherFrom from = Gatherer::atProbe(point, id, ignored);
+template <class Light>
+uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::span<const uint8_t> groups,
+                                       std::vector<LightOfTerm<Light>>& row) {
     const uint64_t shadow_rays = findActive(from, groups);
     row.clear();
     const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row);
-    for (ProbeTermLight& l : row)
+    for (LightOfTerm<Light>& l : row)
         if (const auto touched = stored_.touched(); std::ranges::binary_search(touched, l.term))
             l.light += stored_[l.term];
     stored_.clear();
@@ -43,7 +43,8 @@ uint64_t ProbeGather::gather(glm::vec3 position_m, uint32_t id, std::span<const 
 }
 
 // As for texels: lit straight, or by as much as the term's threshold asks.
-uint64_t ProbeGather::findActive(const GatherFrom& from, std::span<const uint8_t> groups) {
+template <class Light>
+uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from, std::span<const uint8_t> groups) {
     const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, stored_);
     gatherer_.gather(from,
                      {.rays = settings_.series_rays,
@@ -64,5 +65,8 @@ uint64_t ProbeGather::findActive(const GatherFrom& from, std::span<const uint8_t
     std::erase_if(active_, [&](uint32_t t) { return !groups[gatherer_.paths().terms()[t].group]; });
     return shadow_rays;
 }
+
+template class ReceiverGather<Gathered>;
+template class ReceiverGather<ProbeLight>;
 
 }  // namespace dimmer::cook

@@ -13,14 +13,15 @@
 namespace dimmer::cook {
 
 // One worker's scratch; not thread-safe, make one per thread.
-class ProbeGather {
+template <class Light>
+class ReceiverGather {
    public:
-    ProbeGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series, const BakeSettings& settings);
+    ReceiverGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                   const BakeSettings& settings);
 
     // Replaces `row`. `id` seeds the probe's rays; `groups`: per light group, whether it is asked for; `ignored`: the
     // model that the probe lights. Returns the rays traced.
-    uint64_t gather(glm::vec3 position_m, uint32_t id, std::span<const uint8_t> groups, uint32_t ignored,
-                    std::vector<ProbeTermLight>& row);
+    uint64_t gather(const GatherFrom& from, std::span<const uint8_t> groups, std::vector<LightOfTerm<Light>>& row);
 
    private:
     // Returns the shadow rays traced.
@@ -32,9 +33,11 @@ class ProbeGather {
     const BakeSettings& settings_;
     std::vector<float> floors_;
     FinalGatherOptions options_;
-    FinalGather<ProbeLight> final_;
-    TermAccumulator<ProbeLight> sum_, direct_, stored_;
+    FinalGather<Light> final_;
+    TermAccumulator<Light> sum_, direct_, stored_;
     std::vector<uint32_t> active_;
 };
+
+using ProbeGather = ReceiverGather<ProbeLight>;
 
 }  // namespace dimmer::cook

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <dimmer/error.h>
+#include <dimmer/model_mesh.h>
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <glm/glm.hpp>
@@ -77,6 +79,10 @@ inline bool hasLightmap(const SceneMesh& mesh) {
 
 // What a light grid lights: all meshes of one node. Model space is the node's, in metres: turned and moved as the node,
 // not scaled nor mirrored; where the node is sheared, it is turned as the world.
+// What arrives on a model's surface of the light around it, in its own axes: by mesh of the model and vertex of the
+// mesh; of its front, and of its back where the mesh has a double-sided material (else the same as the front's).
+using ModelTransfers = std::vector<std::vector<std::array<LightTransfer, 2>>>;
+
 struct SceneModel {
     std::string node;
     std::vector<uint32_t> meshes;  // into Scene::meshes; none: a place where things that move may stand
@@ -87,6 +93,7 @@ struct SceneModel {
     glm::uvec3 probes{0};            // along each axis of the box, its corners included; of what stands
     bool is_instance_shape = false;  // model space knows the node's shape alone: nodes of one mesh may share it
     glm::vec3 scale{1};              // that model space has applied to the node's
+    std::shared_ptr<const ModelTransfers> transfers;  // null before findTransfers() (models/self_visibility.h)
     glm::vec3 world(glm::vec3 p) const { return origin_m + world_from_model * p; }
 };
 

@@ -67,15 +67,19 @@ LightTransfer modelTransfer(const ModelVertex& vertex, const Transform& world_fr
     std::array<float, 9> t;
     for (size_t i = 0; i < 9; ++i)
         t[i] = std::max(static_cast<float>(vertex.transfer[i]) / 127, -1.0f) * transfer_bounds[bandOf(i)];
+    return turned({t}, world_from_model);
+}
+
+LightTransfer turned(const LightTransfer& transfer, const Transform& world_from_model) {
+    const auto& t = transfer.coefficients;
     const Mat3 r = rotationOf(world_from_model);
     const Vec3 lobe = times(r, {t[3], t[1], t[2]});
     // R M R^T, column by column: its columns are R M (R^T e), and the rows of R are what R^T e picks.
     const Mat3 m = quadratic(t);
-    Mat3 turned;
-    for (size_t c = 0; c < 3; ++c) turned[c] = times(r, times(m, {r[0][c], r[1][c], r[2][c]}));
-    return {{t[0], lobe[1], lobe[2], lobe[0], 2 * turned[1][0] / band2_product, 2 * turned[2][1] / band2_product,
-             turned[2][2] / (2 * band2_polar), 2 * turned[2][0] / band2_product,
-             (turned[0][0] - turned[1][1]) / (2 * band2_across)}};
+    Mat3 q;
+    for (size_t c = 0; c < 3; ++c) q[c] = times(r, times(m, {r[0][c], r[1][c], r[2][c]}));
+    return {{t[0], lobe[1], lobe[2], lobe[0], 2 * q[1][0] / band2_product, 2 * q[2][1] / band2_product,
+             q[2][2] / (2 * band2_polar), 2 * q[2][0] / band2_product, (q[0][0] - q[1][1]) / (2 * band2_across)}};
 }
 
 LightTransfer normalTransfer(std::array<float, 3> normal) {

@@ -6,6 +6,7 @@
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <gtest/gtest.h>
+#include <models/self_visibility.h>
 
 #include <memory>
 
@@ -14,6 +15,7 @@ namespace dimmer::cook::test {
 struct BakedScene {
     explicit BakedScene(const Scene& scene_in, float texels_per_metre = 4, uint32_t samples = 4)
         : scene(scene_in), rays(std::make_unique<RayScene>(scene)) {
+        findTransfers(scene);
         auto unwrapped = unwrap(*rays, {.texels_per_metre = texels_per_metre, .page_size = 2048});
         if (!unwrapped) {
             ADD_FAILURE() << unwrapped.error().message;

@@ -133,6 +133,7 @@ TEST(ModelMesh, InstancesOfOneSizeShareTheirMesh) {
     scene.dynamic_places.push_back({"place", placed({1, 2, 3})});
     listModels(scene, {});
     PackData pack;
+    findTransfers(scene);
     describeModels(scene, {}, pack);
     ASSERT_EQ(pack.models.size(), 5u);
     EXPECT_EQ(pack.model_meshes.size(), 3u);

@@ -57,6 +57,8 @@ inline constexpr std::array<float, 3> transfer_bounds = {0.886226925f, 1.0233267
 
 // Of a vertex, in the world's axes. The CPU twin of dimmer_transfer in grid.glsl.
 LightTransfer modelTransfer(const ModelVertex& vertex, const Transform& world_from_model);
+// By the rotation of a transform.
+LightTransfer turned(const LightTransfer& transfer, const Transform& world_from_model);
 // Without self-visibility: of the normal alone; unit, world axes.
 LightTransfer normalTransfer(std::array<float, 3> normal);
 

@@ -1,0 +1,100 @@
+// Places of models' surfaces, and the transfers that models of one shape share.
+#include <models/model_scenes.h>
+#include <models/model_surface.h>
+#include <models/self_visibility.h>
+
+#include <cmath>
+
+namespace dimmer::cook::test {
+namespace {
+
+// A crate 1 m x 0.5 m x 2 m: sides of 2 m2, 1 m2 and 0.5 m2, twice each.
+Scene crateIn(float room_half_m) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, glm::vec3(room_half_m), grey);
+    addCrate(scene, "crate", placed({0.1, 0.2, 0}, 0.4), {0.5f, 0.25f, 1}, grey);
+    listModels(scene, {});
+    findTransfers(scene);
+    return scene;
+}
+
+glm::vec3 normalOf(const RayScene& rays, const ModelPlace& p) {
+    const uint32_t side = p.point.face - triangle_faces;
+    return rays.triangles()[side / 2].normal * (side % 2 ? -1.0f : 1.0f);
+}
+
+TEST(ModelPlaces, LieAllOverTheSurfaceByItsArea) {
+    const Scene scene = crateIn(5);
+    const RayScene rays(scene);
+    const auto places = modelPlaces(rays, 0, 700);
+    ASSERT_EQ(places.size(), 700u);
+    size_t upwards = 0;
+    for (const ModelPlace& p : places) {
+        const glm::vec3 n = normalOf(rays, p);
+        upwards += n.y > 0.9f;
+        // A convex model hides nothing of itself: the transfer is that of its normal, turned as the model is.
+        const LightTransfer whole = normalTransfer({n.x, n.y, n.z});
+        for (size_t c = 0; c < 9; ++c) EXPECT_NEAR(p.transfer.coefficients[c], whole.coefficients[c], 1e-4f);
+        float shares = 0;
+        glm::vec3 between(0);
+        for (size_t k = 0; k < 8; ++k) {
+            shares += p.near.share[k];
+            between += p.near.share[k] * probePosition(scene.models[0], p.near.number[k]);
+        }
+        EXPECT_NEAR(shares, 1, 1e-5f);
+        // Linear between the probes is exact for positions; places are lifted by a millimetre.
+        EXPECT_LT(glm::distance(between, p.point.position_m), 1.1e-3f);
+    }
+    // 2 m2 of 7 m2: 200 of 700, in a sequence that is more even than chance.
+    EXPECT_NEAR(static_cast<double>(upwards), 200, 10);
+}
+
+TEST(ModelPlaces, NoneLieInOtherGeometry) {
+    const Scene scene = crateIn(0.35f);  // walls that cut the crate: its upper and lower sides lie beyond them
+    const RayScene rays(scene);
+    for (const ModelPlace& p : modelPlaces(rays, 0, 200))
+        for (int axis = 0; axis < 3; ++axis) EXPECT_LT(std::abs(p.point.position_m[axis]), 0.35f);
+}
+
+TEST(ModelPlaces, WhatIsDoubleSidedHasPlacesOnBothSides) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f)), cloth = addMaterial(scene, lambert(0.5f));
+    scene.materials[cloth].double_sided = true;
+    addBox(scene, {3, 3, 3}, grey);
+    addQuad(scene, "curtain", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}, cloth).lighting = Lighting::LocalGrid;
+    listModels(scene, {});
+    findTransfers(scene);
+    const RayScene rays(scene);
+    size_t front = 0;
+    const auto places = modelPlaces(rays, 0, 400);
+    for (const ModelPlace& p : places) {
+        const glm::vec3 n = normalOf(rays, p);
+        front += n.z > 0;
+        EXPECT_GT(n.z * p.point.position_m.z, 0);  // lifted to its own side
+        EXPECT_GT(n.z * p.transfer.coefficients[2], 0);
+    }
+    EXPECT_NEAR(static_cast<double>(front), 200, 10);
+}
+
+TEST(FindTransfers, ModelsOfOneShapeShareTheirs) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    const auto add = [&](const char* node, const glm::dmat4& at) {
+        SceneMesh& mesh = addCrate(scene, node, at, {0.5f, 0.3f, 0.2f}, grey);
+        mesh.gltf_mesh = 7;
+        mesh.gltf_node = static_cast<int>(scene.meshes.size());
+    };
+    add("first", placed({0, 0, 0}));
+    add("turned", placed({5, 1, 0}, 1.2, {0.6, 0.8, 0}));
+    add("larger", glm::scale(placed({9, 0, 0}), glm::dvec3(1.5)));
+    listModels(scene, {});
+    findTransfers(scene);
+    ASSERT_EQ(scene.models.size(), 3u);
+    ASSERT_TRUE(scene.models[0].transfers);
+    EXPECT_EQ(scene.models[0].transfers, scene.models[1].transfers);
+    EXPECT_NE(scene.models[0].transfers, scene.models[2].transfers);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test

@@ -1,0 +1,149 @@
+// Models' probes fitted to their surface, against light that is known.
+#include <bake/sampling.h>
+#include <encode/encode_probe.h>
+#include <gtest/gtest.h>
+#include <probes/envelope.h>
+#include <probes/model_fit.h>
+#include <probes/spherical_harmonics.h>
+
+#include <cmath>
+
+namespace dimmer::cook::test {
+namespace {
+
+// Of a model of 2 x 2 x 2 probes, the corners of a unit cube, on all normals.
+std::vector<ModelPlace> placesInCube(uint32_t count) {
+    std::vector<ModelPlace> places;
+    for (uint32_t i = 0; i < count; ++i) {
+        const glm::vec3 at = sequence3d(i, 1), n = uniformSphereDirection(sequence2d(i, 2));
+        ModelPlace place{.point = {at}, .near = {}, .transfer = normalTransfer({n.x, n.y, n.z})};
+        for (uint32_t k = 0; k < 8; ++k) {
+            place.near.number[k] = k;
+            place.near.share[k] = (k & 1 ? at.x : 1 - at.x) * (k & 2 ? at.y : 1 - at.y) * (k & 4 ? at.z : 1 - at.z);
+        }
+        places.push_back(place);
+    }
+    return places;
+}
+
+glm::vec3 read(const ModelPlace& place, std::span<const ProbeLight> probes) {
+    glm::vec3 lux(0);
+    for (size_t k = 0; k < 8; ++k)
+        for (size_t c = 0; c < sh_count; ++c)
+            lux += place.near.share[k] * place.transfer.coefficients[c] * probes[place.near.number[k]].radiance[c];
+    return lux;
+}
+
+// A lone lamp far away, `turn` around y, as harmonics have it.
+ProbeLight lamp(float turn, float cd_m2) {
+    ProbeLight light;
+    light.add(glm::vec3(cd_m2, cd_m2, 2 * cd_m2), ProbeLight::weightsOf({std::cos(turn), 0, std::sin(turn)}));
+    return light;
+}
+
+TEST(ModelFit, FindsTheProbesThatMadeTheLight) {
+    // Mostly even, so that no normal is near to a negative irradiance.
+    std::vector<ProbeLight> made, probes;
+    for (uint32_t i = 0; i < 8; ++i) {
+        made.push_back(lamp(static_cast<float>(i), 1.0f + static_cast<float>(i % 3)));
+        made.back().radiance[0] += glm::vec3(3);
+        probes.push_back(made.back() * 0.9f);  // what was gathered there is somewhat off
+        probes.back().radiance[3] += 0.2f;
+    }
+    const auto places = placesInCube(400);
+    std::vector<glm::vec3> lux;
+    for (const ModelPlace& p : places) lux.push_back(read(p, made));
+    const auto meanError = [&] {
+        double error = 0;
+        for (size_t i = 0; i < places.size(); ++i)
+            error += static_cast<double>(std::abs(read(places[i], probes).x - lux[i].x) / lux[i].x);
+        return error / static_cast<double>(places.size());
+    };
+    const double before = meanError();
+    fitModel(places, lux, probes);
+    // What was gathered still has a tenth of a say, spread over what the places know little of.
+    EXPECT_GT(before, 0.05);
+    EXPECT_LT(meanError(), before / 10);
+}
+
+// Light from a half of the sky that no three bands can have without a negative lobe: cut off at 0 and nothing behind.
+TEST(ModelFit, NoNormalGetsNegativeLightAndDeringingTakesNothing) {
+    const auto places = placesInCube(400);
+    std::vector<glm::vec3> lux;
+    for (size_t i = 0; i < places.size(); ++i) {
+        const glm::vec3 n = uniformSphereDirection(sequence2d(static_cast<uint32_t>(i), 2));
+        lux.emplace_back(100 * std::max(n.y, 0.0f) + 1);
+    }
+    ProbeLight gathered;
+    gathered.add(glm::vec3(100), ProbeLight::weightsOf({0, 1, 0}));
+    ASSERT_LT(positiveShare(gathered), 0.9f);
+    std::vector<ProbeLight> probes(8, gathered), flat(8, flattened(gathered, 0.95f * positiveShare(gathered)));
+    fitModel(places, lux, probes);
+    double fitted = 0, deringed = 0;
+    for (ProbeLight& p : probes) {
+        // Normals lie some 18 degrees apart: between two of them a lobe falls by less than the 5 % that it keeps.
+        EXPECT_GT(positiveShare(p), 0.97f);
+        p = flattened(p, positiveShare(p));
+    }
+    for (size_t i = 0; i < places.size(); ++i) {
+        const auto square = [&](std::span<const ProbeLight> p) {
+            const float error = read(places[i], p).x - lux[i].x;
+            return static_cast<double>(error * error / (std::max(read(places[i], flat).x, 0.0f) + 2.5f));
+        };
+        fitted += square(probes);
+        deringed += square(flat);
+    }
+    // The least of what keeps 5 % of its mean on every normal, of which what is flattened is one.
+    EXPECT_LT(fitted, deringed);
+}
+
+TEST(ModelFit, WhereAllIsDarkProbesStay) {
+    const auto places = placesInCube(100);
+    const std::vector<glm::vec3> dark(places.size(), glm::vec3(0));
+    std::vector<ProbeLight> probes(8, lamp(1, 2));
+    fitModel(places, dark, probes);
+    for (const ProbeLight& p : probes) EXPECT_EQ(p.radiance, lamp(1, 2).radiance);
+}
+
+// One channel dark, all probes dark: nothing to weigh by, and no division by it.
+TEST(ModelFit, DarkProbesAndChannelsGiveFiniteLight) {
+    const auto places = placesInCube(60);  // fewer than there are unknowns
+    std::vector<glm::vec3> lux(places.size(), glm::vec3(0));
+    for (size_t i = 0; i < lux.size(); i += 2) lux[i] = glm::vec3(5, 0, 1e-30f);
+    std::vector<ProbeLight> probes(8);
+    fitModel(places, lux, probes);
+    float most = 0;
+    for (const ProbeLight& p : probes)
+        for (const glm::vec3& c : p.radiance) {
+            EXPECT_TRUE(std::isfinite(c.x) && std::isfinite(c.z));
+            EXPECT_EQ(c.y, 0);
+            most = std::max(most, c.x);
+        }
+    EXPECT_GT(most, 0.1f);
+}
+
+// A = B B^T + 1 with a known x, in an envelope that begins at other columns in each row.
+TEST(EnvelopeMatrix, SolvesWhatItWasMultipliedWith) {
+    constexpr size_t n = 40;
+    std::vector<size_t> first;
+    for (size_t i = 0; i < n; ++i) first.push_back(i - std::min<size_t>(i, 3 + i % 9));
+    EnvelopeMatrix matrix(first);
+    std::vector<std::vector<double>> dense(n, std::vector<double>(n));
+    for (size_t i = 0; i < n; ++i)
+        for (size_t j = first[i]; j <= i; ++j) {
+            const double entry = i == j ? 20 : std::sin(static_cast<double>(7 * i + 3 * j));
+            matrix.at(i, j) = dense[i][j] = dense[j][i] = entry;
+        }
+    std::vector<double> x(n), product(n), expected(n);
+    for (size_t i = 0; i < n; ++i) x[i] = std::cos(static_cast<double>(i));
+    for (size_t i = 0; i < n; ++i)
+        for (size_t j = 0; j < n; ++j) expected[i] += dense[i][j] * x[j];
+    matrix.multiply(x, product);
+    for (size_t i = 0; i < n; ++i) EXPECT_NEAR(product[i], expected[i], 1e-12);
+    matrix.factor();
+    matrix.solve(expected);
+    for (size_t i = 0; i < n; ++i) EXPECT_NEAR(expected[i], x[i], 1e-12);
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
