@@ -168,7 +168,8 @@ class GroupStore {
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
 // receivers traced once and followed bounce after bounce, then one gather of many rays that is kept.
 // Deterministic for any number of threads, and whatever a store already has. Memory: 4 bytes * series_rays per texel,
-// plus what is active.
+// plus what is active. Models whose transfers were not found (models/self_visibility.h) get what was gathered at their
+// probes.
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
            Progress& progress, GroupStore* store = nullptr);
 

@@ -64,8 +64,9 @@ LightTransfer transferAt(const Scene& scene, const SceneModel& model, const Leve
 
 std::vector<ModelPlace> modelPlaces(const RayScene& rays, uint32_t index, uint32_t count) {
     const SceneModel& model = rays.scene().models[index];
-    const Sides sides = sidesOf(rays, index);
     std::vector<ModelPlace> places;
+    if (!model.transfers) return places;
+    const Sides sides = sidesOf(rays, index);
     if (sides.face.empty() || !(sides.cumulative_m2.back() > 0)) return places;
     for (uint32_t i = 0; places.size() < count && i < tries_per_place * count; ++i) {
         const glm::vec3 draw = sequence3d(i, hash(place_seed, index));
@@ -75,7 +76,8 @@ std::vector<ModelPlace> modelPlaces(const RayScene& rays, uint32_t index, uint32
         const LevelTriangle& triangle = rays.triangles()[t];
         const glm::vec3 on = rays.pointOn(t, u, v);
         const glm::vec3 p = on + (back ? -place_lift_m : place_lift_m) * triangle.normal;
-        if (!inTheOpen(rays, p, index, 0)) continue;
+        // The model's own fronts would make up for backs of what else is there.
+        if (!inTheOpen(rays, p, index, 0) || !inTheOpen(rays, p, no_model, 0)) continue;
         places.push_back({{p, face}, nearProbes(model, on), transferAt(rays.scene(), model, triangle, back, u, v)});
     }
     return places;

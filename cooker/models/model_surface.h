@@ -15,8 +15,8 @@ struct ModelPlace {
     LightTransfer transfer;  // interpolated between the vertices, world axes
 };
 
-// Up to `count` by area, on both sides of what is double-sided, without what lies in other geometry: fewer where most
-// of the model does. Of a model that has its transfers.
+// Up to `count` by area, on both sides of what is double-sided, without what lies inside of other geometry or of other
+// parts of the model: fewer where most of it does. None of a model that has no transfers.
 std::vector<ModelPlace> modelPlaces(const RayScene& rays, uint32_t model, uint32_t count);
 
 }  // namespace dimmer::cook

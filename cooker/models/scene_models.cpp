@@ -148,7 +148,6 @@ std::optional<ModelShape> shapeOf(const Scene& scene, const SceneModel& model) {
     for (const uint32_t m : model.meshes) {
         shape.materials.push_back(scene.meshes[m].triangle_materials);
         shape.vertices.push_back(scene.meshes[m].positions_m.size());
-        shape.light_sets.push_back(scene.meshes[m].light_set);
     }
     return shape;
 }

@@ -28,8 +28,7 @@ struct ModelShape {
     int gltf_mesh = -1;
     std::array<long, 3> scale{};  // in tenths of a permille
     std::vector<std::vector<uint32_t>> materials;
-    std::vector<size_t> vertices;
-    std::vector<std::optional<uint32_t>> light_sets;
+    std::vector<size_t> vertices;  // of what import has left of each mesh
     auto operator<=>(const ModelShape&) const = default;
 };
 // None where a model is like no other.

@@ -70,7 +70,9 @@ class ModelMeshes {
     std::pair<uint32_t, uint32_t> of(const SceneModel& model) {
         const auto shape = shapeOf(scene_, model);
         if (!shape) return add(model);
-        const auto [it, fresh] = shared_.try_emplace(*shape);
+        std::vector<std::optional<uint32_t>> light_sets;
+        for (const uint32_t m : model.meshes) light_sets.push_back(scene_.meshes[m].light_set);
+        const auto [it, fresh] = shared_.try_emplace({*shape, std::move(light_sets)});
         if (fresh) it->second = add(model);
         return it->second;
     }
@@ -111,7 +113,7 @@ class ModelMeshes {
     const Scene& scene_;
     std::span<const glm::vec3> emission_cd_m2_;
     PackData& pack_;
-    std::map<ModelShape, std::pair<uint32_t, uint32_t>> shared_;
+    std::map<std::pair<ModelShape, std::vector<std::optional<uint32_t>>>, std::pair<uint32_t, uint32_t>> shared_;
 };
 
 // As modelNormal() unfolds it.

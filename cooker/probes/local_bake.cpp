@@ -17,20 +17,7 @@ constexpr uint32_t local_probe_seed = 0x1f83d9abu, local_place_seed = 0x5be0cd19
 // Of a model's surface: a probe has nine numbers for each channel.
 constexpr uint32_t places_per_probe = 16;
 
-// Models of which no probe is in the open.
-void warnOfBuried(const Gatherer& gatherer, std::vector<std::string>& warnings) {
-    const ModelReceivers& models = gatherer.models();
-    uint32_t last = no_model;
-    for (uint32_t i = 0; i < models.places().source.size(); ++i) {
-        const uint32_t model = models.modelOfProbe(i);
-        if (models.places().source[i] != no_index || model == last) continue;
-        last = model;
-        warnings.push_back(fmt::format("node '{}': stands inside of other geometry; its light grid is black",
-                                       gatherer.rays().scene().models[model].node));
-    }
-}
-
-// What was gathered for a model.
+// What was gathered for a model. A term that is not active at a place brings less than its threshold there: nothing.
 struct ModelLight {
     std::span<const ModelPlace> places;
     std::span<const std::vector<ReceiverLight>> at_places;
@@ -94,23 +81,20 @@ class LocalBake {
           groups_(groups),
           progress_(progress),
           lights_(gatherer.rays(), settings.light_grid) {
-        const Scene& scene = gatherer.rays().scene();
-        for (uint32_t m = 0; m < scene.models.size(); ++m) {
-            if (scene.models[m].moves) continue;
-            const glm::uvec3 n = scene.models[m].probes;
-            const uint32_t probes = n.x * n.y * n.z;
-            const auto places = modelPlaces(gatherer.rays(), m, places_per_probe * probes);
-            first_place_.push_back(places_.size());
+        const auto& models = gatherer.rays().scene().models;
+        for (uint32_t m = 0; m < models.size(); ++m) {
+            if (models[m].moves) continue;
+            model_.push_back(m);
             first_probe_.push_back(probes_);
-            places_.insert(places_.end(), places.begin(), places.end());
-            probes_ += probes;
+            probes_ += models[m].probes.x * models[m].probes.y * models[m].probes.z;
         }
-        first_place_.push_back(places_.size());
         first_probe_.push_back(probes_);
     }
 
     std::vector<std::vector<ProbeTermLight>> run() {
-        progress_.stage("local grids", probes_ + places_.size());
+        // Probes are gathered and fitted.
+        progress_.stage("local grids", size_t{2 + places_per_probe} * probes_);
+        findPlaces();
         const ProbePlaces& at = gatherer_.models().places();
         auto at_probes = gathered<ProbeLight>(probes_, [&](size_t i, auto& gather, auto& row) -> uint64_t {
             const auto number = static_cast<uint32_t>(i);
@@ -126,20 +110,55 @@ class LocalBake {
             return gather.gather({.points = {&places_[i].point, 1}, .id = local_place_seed + static_cast<uint32_t>(i)},
                                  groups_, row);
         });
-        for (size_t m = 0; m + 1 < first_probe_.size(); ++m) {
+        progress_.advance(size_t{places_per_probe} * probes_ - places_.size());
+        tbb::parallel_for(size_t{0}, model_.size(), [&](size_t m) {
             const size_t place = first_place_[m], places = first_place_[m + 1] - place;
             const size_t probe = first_probe_[m], probes = first_probe_[m + 1] - probe;
-            if (places == 0) continue;
-            auto rows = fitTerms(
-                series_, {std::span(places_).subspan(place, places), std::span(at_places).subspan(place, places),
-                          std::span(at_probes).subspan(probe, probes)});
-            std::ranges::move(rows, at_probes.begin() + static_cast<std::ptrdiff_t>(probe));
-        }
+            if (places > 0) {
+                auto rows = fitTerms(
+                    series_, {std::span(places_).subspan(place, places), std::span(at_places).subspan(place, places),
+                              std::span(at_probes).subspan(probe, probes)});
+                std::ranges::move(rows, at_probes.begin() + static_cast<std::ptrdiff_t>(probe));
+            }
+            progress_.advance(probes);
+        });
         return at_probes;
     }
     uint64_t rays() const { return rays_; }
 
+    void warn(std::vector<std::string>& warnings) const {
+        const auto& source = gatherer_.models().places().source;
+        for (size_t m = 0; m < model_.size(); ++m) {
+            const std::string& node = gatherer_.rays().scene().models[model_[m]].node;
+            const size_t probes = first_probe_[m + 1] - first_probe_[m];
+            const bool has_places = first_place_[m + 1] > first_place_[m];
+            if (!has_places && std::ranges::all_of(std::span(source).subspan(first_probe_[m], probes),
+                                                   [](uint32_t s) { return s == no_index; }))
+                warnings.push_back(
+                    fmt::format("node '{}': stands inside of other geometry; its light grid is black", node));
+            if (probes > fitted_probes_max)
+                warnings.push_back(
+                    fmt::format("node '{}': of its {} probes none is fitted to its surface, which is done "
+                                "for up to {}; mend: a larger dimmer_grid_spacing, or parts",
+                                node, probes, fitted_probes_max));
+        }
+    }
+
    private:
+    void findPlaces() {
+        std::vector<std::vector<ModelPlace>> of_model(model_.size());
+        tbb::parallel_for(size_t{0}, model_.size(), [&](size_t m) {
+            const size_t probes = first_probe_[m + 1] - first_probe_[m];
+            if (probes > fitted_probes_max) return;
+            of_model[m] = modelPlaces(gatherer_.rays(), model_[m], places_per_probe * static_cast<uint32_t>(probes));
+        });
+        for (const auto& places : of_model) {
+            first_place_.push_back(places_.size());
+            places_.insert(places_.end(), places.begin(), places.end());
+        }
+        first_place_.push_back(places_.size());
+    }
+
     template <class Light>
     std::vector<std::vector<LightOfTerm<Light>>> gathered(size_t count, auto&& at) {
         std::vector<std::vector<LightOfTerm<Light>>> rows(count);
@@ -159,6 +178,7 @@ class LocalBake {
     std::span<const uint8_t> groups_;
     Progress& progress_;
     LightGrid lights_;
+    std::vector<uint32_t> model_;  // those that stand
     std::vector<ModelPlace> places_;
     std::vector<size_t> first_place_, first_probe_;  // per model that stands, and the ends
     size_t probes_ = 0;
@@ -175,7 +195,7 @@ Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& se
         LocalBake bake(gatherer, series, settings, groups, progress);
         rows = bake.run();
         rays += bake.rays();
-        warnOfBuried(gatherer, warnings);
+        bake.warn(warnings);
     }
     return Sparse<ProbeTermLight>::build(rows.size(), [&](size_t begin, size_t end, auto emit) {
         for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[i]));

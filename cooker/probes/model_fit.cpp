@@ -126,7 +126,7 @@ class ModelFit {
     }
 
     // 1/2 x.A x - target.x + the penalty, from the least of what comes before the penalty. Between changes of which
-    // normals are negative it is a quadratic, so that Newton's steps end at the exact least.
+    // normals are negative it is a quadratic, of which each of Newton's steps finds the least.
     void minimise(std::span<const double> target, Coefficients& x) const {
         if (!(penalty(x) > 0)) return;
         Coefficients image(size()), step(size()), image_of_step(size()), trial(size());

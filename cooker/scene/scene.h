@@ -77,12 +77,12 @@ inline bool hasLightmap(const SceneMesh& mesh) {
     return mesh.lighting == Lighting::Automatic || mesh.lighting == Lighting::Lightmap;
 }
 
-// What a light grid lights: all meshes of one node. Model space is the node's, in metres: turned and moved as the node,
-// not scaled nor mirrored; where the node is sheared, it is turned as the world.
 // What arrives on a model's surface of the light around it, in its own axes: by mesh of the model and vertex of the
 // mesh; of its front, and of its back where the mesh has a double-sided material (else the same as the front's).
 using ModelTransfers = std::vector<std::vector<std::array<LightTransfer, 2>>>;
 
+// What a light grid lights: all meshes of one node. Model space is the node's, in metres: turned and moved as the node,
+// not scaled nor mirrored; where the node is sheared, it is turned as the world.
 struct SceneModel {
     std::string node;
     std::vector<uint32_t> meshes;  // into Scene::meshes; none: a place where things that move may stand

@@ -51,10 +51,31 @@ TEST(ModelPlaces, LieAllOverTheSurfaceByItsArea) {
 }
 
 TEST(ModelPlaces, NoneLieInOtherGeometry) {
-    const Scene scene = crateIn(0.35f);  // walls that cut the crate: its upper and lower sides lie beyond them
+    const Scene scene = crateIn(0.35f);  // walls that cut the crate: of its sides the lower one alone is in the room
     const RayScene rays(scene);
-    for (const ModelPlace& p : modelPlaces(rays, 0, 200))
+    const auto places = modelPlaces(rays, 0, 200);
+    EXPECT_GT(places.size(), 20u);
+    for (const ModelPlace& p : places)
         for (int axis = 0; axis < 3; ++axis) EXPECT_LT(std::abs(p.point.position_m[axis]), 0.35f);
+}
+
+// A leg that stands in a block of the same model: what of it lies inside of the block is seen by nobody.
+TEST(ModelPlaces, NoneLieInsideOfTheModelItself) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {3, 3, 3}, grey);
+    addCrate(scene, "post", placed({0, 0, 0}), {0.5f, 0.5f, 0.5f}, grey).gltf_node = 1;
+    addCrate(scene, "post", placed({0, 0.5, 0}), {0.1f, 1, 0.1f}, grey).gltf_node = 1;
+    listModels(scene, {});
+    ASSERT_EQ(scene.models.size(), 1u);
+    findTransfers(scene);
+    const RayScene rays(scene);
+    const auto places = modelPlaces(rays, 0, 300);
+    EXPECT_EQ(places.size(), 300u);
+    for (const ModelPlace& p : places) {
+        const glm::vec3 size = glm::abs(p.point.position_m);
+        EXPECT_FALSE(size.x < 0.49f && size.y < 0.49f && size.z < 0.49f) << p.point.position_m.y;
+    }
 }
 
 TEST(ModelPlaces, WhatIsDoubleSidedHasPlacesOnBothSides) {
@@ -88,6 +109,9 @@ TEST(FindTransfers, ModelsOfOneShapeShareTheirs) {
     add("first", placed({0, 0, 0}));
     add("turned", placed({5, 1, 0}, 1.2, {0.6, 0.8, 0}));
     add("larger", glm::scale(placed({9, 0, 0}), glm::dvec3(1.5)));
+    // Which set dims it changes nothing of what it hides from itself: nor may it change which models share.
+    scene.light_sets.push_back({"lamps", 1});
+    scene.meshes[1].light_set = 0;
     listModels(scene, {});
     findTransfers(scene);
     ASSERT_EQ(scene.models.size(), 3u);
