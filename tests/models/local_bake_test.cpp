@@ -154,6 +154,20 @@ TEST(LocalBake, ProbesInsideOtherGeometryCopyTheNearestInTheOpen) {
     }
 }
 
+TEST(LocalBake, OfTooManyProbesNoneIsFittedAndTheCookSaysSo) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {2, 2, 2}, grey);
+    addCrate(scene, "crate", placed({0, 0, 0}), {0.5f, 0.5f, 0.5f}, grey);
+    addPointLight(scene, {1.5f, 1.5f, 0}, 100, BakeMode::Indirect);
+    listModels(scene, {.spacing_m = 0.2f, .probes_max = 1000});
+    BakedScene b(scene, 1);
+    b.bake({.series_rays = 8, .final_rays = 32});
+    EXPECT_EQ(b.baked.local_light.rows(), 216u);
+    ASSERT_EQ(b.baked.warnings.size(), 1u);
+    EXPECT_NE(b.baked.warnings[0].find("'crate': of its 216 probes none is fitted"), std::string::npos);
+}
+
 TEST(LocalBake, ASetsLightIsTheSameWithAnotherSetBesideIt) {
     const auto bakedWith = [](bool second) {
         Scene scene;

@@ -116,27 +116,32 @@ TEST(ModelFit, WhatNoPlaceAsksForStaysAsGathered) {
     for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(probes[i].irradiance().x, 7, 0.2 * (7 - 0.886));
 }
 
-// Of two kinds of places that contradict each other, those that the gathered light has dark count for more: least
-// squares with weights w give the mean with those weights.
+// Probes A and B, and places that read A alone, B alone, or half of each, where the halves ask for more than the others
+// together: the least squares have A and B miss theirs as the inverses of the weights, which are 1 / (light as gathered
+// + a tenth of its mean).
 TEST(ModelFit, DarkPlacesCountForMore) {
-    auto places = placesInCube(400);
+    auto places = placesInCube(600);
+    constexpr float dark = 1, bright = 100;
     std::vector<glm::vec3> lux;
     for (size_t i = 0; i < places.size(); ++i) {
-        const bool dark = i % 2;  // the left half is gathered with 1 lux, the right one with 100
-        for (size_t k = 0; k < 8; ++k) places[i].near.share[k] = 0;
-        places[i].near.share[0] = dark ? 0.99f : 0.5f;  // all read mostly probe 0, and dark ones hardly probe 1
-        places[i].near.share[1] = dark ? 0.01f : 0.5f;
-        lux.emplace_back(dark ? 1.0f : 40.0f);
+        places[i].near.share = {};
+        places[i].near.share[0] = i % 3 == 0 ? 1.0f : i % 3 == 1 ? 0.0f : 0.5f;
+        places[i].near.share[1] = 1 - places[i].near.share[0];
+        lux.emplace_back(i % 3 == 0 ? dark : i % 3 == 1 ? bright : 1.5f * (dark + bright));
     }
     std::vector<ProbeLight> probes(8);
-    probes[0].radiance[0] = glm::vec3(1);
-    probes[1].radiance[0] = glm::vec3(100);
+    const float dc_per_lux = 1 / (ProbeLight{{glm::vec3(1)}}.irradiance().x);
+    probes[0].radiance[0] = glm::vec3(dark * dc_per_lux);
+    probes[1].radiance[0] = glm::vec3(bright * dc_per_lux);
     fitModel(places, lux, probes);
-    double dark = 0, bright = 0;
-    for (size_t i = 0; i < places.size(); ++i)
-        (i % 2 ? dark : bright) += static_cast<double>(std::abs(read(places[i], probes).x - lux[i].x) / lux[i].x) / 200;
-    EXPECT_LT(dark, 0.2);
-    EXPECT_LT(bright, 0.2);
+    const double floor = 0.1 * (double{dark} + bright) / 2;
+    const double expected = (dark + floor) / (bright + floor);
+    const double a = static_cast<double>(probes[0].irradiance().x - dark);
+    const double b = static_cast<double>(probes[1].irradiance().x - bright);
+    EXPECT_GT(a, 0.1);
+    // What was gathered has at most a tenth of the mean of all 72 numbers' say, of which two probes' 18 have all: a
+    // fortieth of it is A's, and B's weight is a seventeenth.
+    EXPECT_NEAR(a / b, expected, 0.15 * expected);
 }
 
 TEST(ModelFit, WhereAllIsDarkProbesStay) {
