@@ -119,17 +119,9 @@ TEST(SelfVisibility, ALidThrowsBackWhatItReflects) {
 }
 
 TEST(ModelMesh, InstancesOfOneSizeShareTheirMesh) {
-    Scene scene;
-    const uint32_t grey = addMaterial(scene, lambert(0.5f));
-    const auto add = [&](const char* node, const glm::dmat4& at) {
-        SceneMesh& mesh = addCrate(scene, node, at, {0.5f, 0.3f, 0.2f}, grey);
-        mesh.gltf_mesh = 7;
-        mesh.gltf_node = static_cast<int>(scene.meshes.size());
-    };
-    add("first", placed({0, 0, 0}));
-    add("turned", placed({5, 1, 0}, 1.2, {0.6, 0.8, 0}));
-    add("larger", glm::scale(placed({9, 0, 0}), glm::dvec3(1.5)));
-    addCrate(scene, "mover", placed({0, 0, 9}), {0.5f, 0.3f, 0.2f}, grey, Lighting::Dynamic);
+    Scene scene = crateInstances();
+    addCrate(scene, "mover", placed({0, 0, 9}), {0.5f, 0.3f, 0.2f}, scene.meshes[0].triangle_materials[0],
+             Lighting::Dynamic);
     scene.dynamic_places.push_back({"place", placed({1, 2, 3})});
     listModels(scene, {});
     PackData pack;

@@ -41,4 +41,19 @@ inline glm::dmat4 placed(glm::dvec3 at, double turn_rad = 0, glm::dvec3 axis = {
     return glm::rotate(glm::translate(glm::dmat4(1), at), turn_rad, axis);
 }
 
+// Three nodes of one mesh: "first", "turned" and, 1.5 times the size, "larger".
+inline Scene crateInstances() {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    const auto add = [&](const char* node, const glm::dmat4& at) {
+        SceneMesh& mesh = addCrate(scene, node, at, {0.5f, 0.3f, 0.2f}, grey);
+        mesh.gltf_mesh = 7;
+        mesh.gltf_node = static_cast<int>(scene.meshes.size());
+    };
+    add("first", placed({0, 0, 0}));
+    add("turned", placed({5, 1, 0}, 1.2, {0.6, 0.8, 0}));
+    add("larger", glm::scale(placed({9, 0, 0}), glm::dvec3(1.5)));
+    return scene;
+}
+
 }  // namespace dimmer::cook::test

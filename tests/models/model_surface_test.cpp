@@ -99,16 +99,7 @@ TEST(ModelPlaces, WhatIsDoubleSidedHasPlacesOnBothSides) {
 }
 
 TEST(FindTransfers, ModelsOfOneShapeShareTheirs) {
-    Scene scene;
-    const uint32_t grey = addMaterial(scene, lambert(0.5f));
-    const auto add = [&](const char* node, const glm::dmat4& at) {
-        SceneMesh& mesh = addCrate(scene, node, at, {0.5f, 0.3f, 0.2f}, grey);
-        mesh.gltf_mesh = 7;
-        mesh.gltf_node = static_cast<int>(scene.meshes.size());
-    };
-    add("first", placed({0, 0, 0}));
-    add("turned", placed({5, 1, 0}, 1.2, {0.6, 0.8, 0}));
-    add("larger", glm::scale(placed({9, 0, 0}), glm::dvec3(1.5)));
+    Scene scene = crateInstances();
     // Which set dims it changes nothing of what it hides from itself: nor may it change which models share.
     scene.light_sets.push_back({"lamps", 1});
     scene.meshes[1].light_set = 0;
