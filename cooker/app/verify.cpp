@@ -100,15 +100,12 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
     return j;
 }
 
-// What was measured at every point of the surface, for tools that look further.
+// What was measured everywhere, for tools that look further.
 Expected<void> writeCsv(const VerifyReport& report, const std::string& file) {
-    std::string text = "x,y,z,nx,ny,nz,lux,reference_lux,reference_error_lux\n";
-    for (size_t i = 0; i < report.points.size(); ++i) {
-        const glm::vec3 p = report.points[i].position_m, n = report.points[i].frame.normal;
-        const LightPair& l = report.surface_pairs[i];
-        text += fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.3g}\n", p.x, p.y, p.z, n.x, n.y, n.z, l.value_lux,
-                            l.reference_lux, l.reference_error_lux);
-    }
+    std::string text = "x,y,z,nx,ny,nz,lux,reference_lux,reference_error_lux,kind\n";
+    for (const auto& [kind, p, n, l] : report.places)
+        text += fmt::format("{},{},{},{},{},{},{:.6g},{:.6g},{:.3g},{}\n", p.x, p.y, p.z, n.x, n.y, n.z, l.value_lux,
+                            l.reference_lux, l.reference_error_lux, kind);
     return writeFileAtomically(file, std::as_bytes(std::span(text)));
 }
 
@@ -166,7 +163,7 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
     c->add_option("--heatmap", a->heatmap,
                   "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
     c->add_option("--csv", a->csv,
-                  "write the light at every point there: the pack's and the reference's luminance, lux");
+                  "write the light at every place of every kind there: the pack's and the reference's luminance, lux");
     c->add_option("--json", a->json, "write the report there; - for stdout");
     c->footer("Example: dimmer verify house.gltf house.dimmer --state \"alarm=0\" --max-error 0.1 --heatmap error");
     c->callback([a, &exit_code] { exit_code = run(*a); });

@@ -199,8 +199,12 @@ Expected<void> verifyGrid(const ReferenceTracer& tracer, const RayScene& rays, c
     }
     const Measured m = measure(tracer, where, values, report.floor_lux, options.paths_max, progress);
     std::vector<LightPair> lit;
-    for (const LightPair& p : m.pairs)
-        if (p.value_lux > 0 || p.reference_lux > 0) lit.push_back(p);
+    for (size_t i = 0; i < where.size(); ++i) {
+        const LightPair& p = m.pairs[i];
+        if (!(p.value_lux > 0) && !(p.reference_lux > 0)) continue;
+        lit.push_back(p);
+        report.places.push_back({"grid", where[i].position_m, where[i].normal, p});
+    }
     report.grid = lightError(lit, report.floor_lux);
     return {};
 }
@@ -322,11 +326,16 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     report.surface = at_surface.figures;
     report.tilted = at_tilted.figures;
     report.surface_pairs = at_surface.pairs;
+    for (size_t i = 0; i < own_queries.size(); ++i)
+        report.places.push_back({"surface", own_queries[i].position_m, own_queries[i].normal, at_surface.pairs[i]});
+    for (size_t i = 0; i < tilted_queries.size(); ++i)
+        report.places.push_back({"tilted", tilted_queries[i].position_m, tilted_queries[i].normal, at_tilted.pairs[i]});
     report.converged = reached(report.surface) && reached(report.tilted);
     if (auto ok = verifyGrid(tracer, rays, pack, options, progress, report); !ok) return std::unexpected(ok.error());
-    const auto models = verifyModels(tracer, rays, pack, options, report.floor_lux, progress);
+    auto models = verifyModels(tracer, rays, pack, options, report.floor_lux, progress);
     if (!models) return std::unexpected(models.error());
-    report.models = *models;
+    std::ranges::move(models->places, std::back_inserter(report.places));
+    report.models = std::move(*models);
     for (const Measured* m : {&at_surface, &at_tilted})
         for (const ReferenceEstimate& e : m->estimates) report.paths += e.paths();
     report.causes["colour_format"] = formatError(at_surface.pairs, pack, *floor_lux);

@@ -58,10 +58,18 @@ struct SetReport {
     double energy_dropped = 0;  // share that fell below the activity threshold, as the pack states it
 };
 
+// One of the places behind the figures.
+struct MeasuredPlace {
+    const char* kind;  // "surface", "tilted", "grid" or "models"
+    glm::vec3 position_m, normal;
+    LightPair light;
+};
+
 // Of models that stand.
 struct ModelFigures {
-    ErrorFigures shadowed;  // with what vertices know of their model's shadow on itself
-    ErrorFigures plain;     // the same places without
+    ErrorFigures shadowed;              // with what vertices know of their model's shadow on itself
+    ErrorFigures plain;                 // the same places without
+    std::vector<MeasuredPlace> places;  // shadowed
 };
 
 struct VerifyReport {
@@ -75,6 +83,7 @@ struct VerifyReport {
     std::vector<SetReport> sets;
     std::vector<VerifyPoint> points;
     std::vector<LightPair> surface_pairs;  // per point
+    std::vector<MeasuredPlace> places;     // all that was measured, kind after kind
     double floor_lux = 0;
     uint64_t paths = 0;
 };

@@ -134,14 +134,18 @@ Expected<ModelFigures> verifyModels(const ReferenceTracer& tracer, const RayScen
         plain.push_back(lux(p, p.plain));
     }
     const Measured m = measure(tracer, where, shadowed, floor_lux, options.paths_max, progress);
+    ModelFigures figures;
     std::vector<LightPair> lit, lit_plain;
     for (size_t i = 0; i < points.size(); ++i) {
         if (!(m.pairs[i].value_lux > 0) && !(m.pairs[i].reference_lux > 0)) continue;
         lit.push_back(m.pairs[i]);
+        figures.places.push_back({"models", where[i].position_m, where[i].normal, m.pairs[i]});
         lit_plain.push_back(m.pairs[i]);
         lit_plain.back().value_lux = plain[i];
     }
-    return ModelFigures{lightError(lit, floor_lux), lightError(lit_plain, floor_lux)};
+    figures.shadowed = lightError(lit, floor_lux);
+    figures.plain = lightError(lit_plain, floor_lux);
+    return figures;
 }
 
 }  // namespace dimmer::cook

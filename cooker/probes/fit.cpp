@@ -8,7 +8,7 @@ namespace dimmer::cook {
 namespace {
 
 // What is traced at a probe itself counts as much as this share of its sites.
-constexpr float prior_share = 0.05f;
+constexpr float prior_share = 0.01f;
 constexpr int steps_max = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
 
 // A FitValue and zeros up to whole registers: most of a cook's fits is spent adding such up.
@@ -27,11 +27,18 @@ using Vector = std::vector<Lanes>;
 // One conjugate gradient for each of the 27 right-hand sides, side by side.
 class Solver {
    public:
-    Solver(std::span<const FitSite> sites, size_t probes) : sites_(sites), diagonal_(probes, 0), prior_(probes) {
+    Solver(std::span<const FitSite> sites, std::span<const float> own, size_t probes)
+        : sites_(sites), diagonal_(probes, 0), prior_(probes, 1) {  // 1: of what counts nowhere, and stays as it is
+        std::vector<float> squares(probes, 0);
         for (const FitSite& s : sites)
-            for (size_t k = 0; k < 4; ++k) diagonal_[s.probes[k]] += s.importance * s.shares[k] * s.shares[k];
+            for (size_t k = 0; k < 4; ++k) {
+                diagonal_[s.probes[k]] += s.importance * s.shares[k] * s.shares[k];
+                squares[s.probes[k]] += s.shares[k] * s.shares[k];
+            }
         for (size_t i = 0; i < probes; ++i) {
-            prior_[i] = diagonal_[i] > 0 ? prior_share * diagonal_[i] : 1;
+            const bool known = !own.empty() && own[i] > 0;
+            if (diagonal_[i] > 0)
+                prior_[i] = prior_share * (known ? std::min(diagonal_[i], own[i] * squares[i]) : diagonal_[i]);
             diagonal_[i] += prior_[i];
         }
     }
@@ -106,7 +113,7 @@ class Solver {
     std::vector<float> diagonal_, prior_;
 };
 
-void replaceGuesses(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<const uint8_t> guessed,
+void replaceGuesses(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<const float> own,
                     std::span<FitValue> probes) {
     std::vector<FitValue> sums(probes.size(), FitValue{});
     std::vector<float> weights(probes.size(), 0);
@@ -114,7 +121,7 @@ void replaceGuesses(std::span<const FitSite> sites, std::span<const FitValue> ta
         for (size_t k = 0; k < 4; ++k) {
             const uint32_t i = sites[s].probes[k];
             const float weight = sites[s].importance * sites[s].shares[k];
-            if (!guessed[i] || !(weight > 0)) continue;
+            if (own[i] > 0 || !(weight > 0)) continue;
             weights[i] += weight;
             for (size_t c = 0; c < 27; ++c) sums[i][c] += weight * targets[s][c];
         }
@@ -125,9 +132,9 @@ void replaceGuesses(std::span<const FitSite> sites, std::span<const FitValue> ta
 }  // namespace
 
 void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes,
-               float tolerance, std::span<const uint8_t> guessed) {
-    if (!guessed.empty()) replaceGuesses(sites, targets, guessed, probes);
-    Solver(sites, probes.size()).solve(targets, tolerance, probes);
+               float tolerance, std::span<const float> own) {
+    if (!own.empty()) replaceGuesses(sites, targets, own, probes);
+    Solver(sites, own, probes.size()).solve(targets, tolerance, probes);
 }
 
 }  // namespace dimmer::cook

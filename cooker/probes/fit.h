@@ -21,9 +21,11 @@ struct FitSite {
 // The least-squares light of the probes (as Kavan, Bargteil and Sloan 2011 have it for vertices): minimises the sum
 // over sites of importance |interpolated - target|^2, and a little of the distance from `probes` as given, which is
 // what was traced there: it decides where sites are few. By conjugate gradients, in an order of their own:
-// deterministic. Ends when what is left to mend is `tolerance` of the light. `guessed`, where it is not empty: probes
-// at which nothing was traced; the mean of the sites that they count at stands for it, where there are any.
+// deterministic. Ends when what is left to mend is `tolerance` of the light. `own`, where it is not empty: per probe
+// the importance of what was traced there, which counts no more than that (beside a lamp it is a thousand times what
+// the sites around have); 0: nothing was, and the mean of the sites that it counts at stands for it, where there are
+// any.
 void fitProbes(std::span<const FitSite> sites, std::span<const FitValue> targets, std::span<FitValue> probes,
-               float tolerance = 1e-3f, std::span<const uint8_t> guessed = {});
+               float tolerance = 1e-3f, std::span<const float> own = {});
 
 }  // namespace dimmer::cook

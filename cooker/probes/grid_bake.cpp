@@ -4,6 +4,7 @@
 #include <probes/tetrahedra.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer::cook {
 namespace {
@@ -64,11 +65,13 @@ class TermFit {
         if (members.empty()) return;
         std::vector<FitValue> probes;
         for (const ProbeTermLight* l : members) probes.push_back(valueOf(l->light));
-        std::vector<uint8_t> guessed;
-        for (size_t i = 0; i < number_.size(); ++i)
-            if (number_[i] != no_probe) guessed.push_back(placed_.guessed[i]);
         chooseSites();
-        fitProbes(sites_, targets_, probes, fit_tolerance, guessed);
+        const float floor = floorOfLight();
+        for (size_t s = 0; s < sites_.size(); ++s) sites_[s].importance = importanceOf(targets_[s], floor);
+        std::vector<float> own;
+        for (size_t i = 0; i < number_.size(); ++i)
+            if (number_[i] != no_probe) own.push_back(placed_.guessed[i] ? 0 : importanceOf(probes[number_[i]], floor));
+        fitProbes(sites_, targets_, probes, fit_tolerance, own);
         for (size_t i = 0; i < members.size(); ++i)
             for (size_t k = 0; k < 27; ++k) members[i]->light.radiance[k / 3][static_cast<int>(k % 3)] = probes[i][k];
     }
@@ -100,20 +103,23 @@ class TermFit {
             targets_.push_back(lit != light_.end() && lit->site == s ? valueOf(*lit->light) : FitValue{});
             sites_.push_back(site);
         }
-        decideImportance();
     }
 
-    // As placement has it, of the term's own light.
-    void decideImportance() {
+    static float brightness(const FitValue& light) { return std::max(0.0f, luminance({light[0], light[1], light[2]})); }
+
+    // Darker places count no more.
+    float floorOfLight() const {
         constexpr float floor_of_mean = 0.1f;
-        const auto lightOf = [&](size_t s) { return luminance({targets_[s][0], targets_[s][1], targets_[s][2]}); };
         double sum = 0;
-        for (size_t s = 0; s < sites_.size(); ++s) sum += static_cast<double>(lightOf(s));
-        const auto floor = floor_of_mean * static_cast<float>(sum / static_cast<double>(sites_.size())) + 1e-12f;
-        for (size_t s = 0; s < sites_.size(); ++s) {
-            const float light = lightOf(s) + floor;
-            sites_[s].importance = floor / light;
-        }
+        for (const FitValue& target : targets_) sum += static_cast<double>(brightness(target));
+        return floor_of_mean * static_cast<float>(sum / static_cast<double>(std::max<size_t>(1, targets_.size()))) +
+               1e-12f;
+    }
+
+    // Between absolute errors and shares, as placement has it, and closer to shares, as lamps' light is known to be
+    // fitted to many places here: with 1 instead of 1.5 the 95th percentile near lamps is a tenth larger.
+    static float importanceOf(const FitValue& light, float floor) {
+        return std::pow(floor / (brightness(light) + floor), 1.5f);
     }
 
     const Placement& placed_;

@@ -12,8 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float error_max = 2;  // what is hopelessly wrong is not worse than that
-
 // Six along the axes and eight between: the corners and sides of a cube.
 struct Normals {
     std::array<std::array<float, 9>, 14> transfer;  // irradiance = dot(transfer, radiance)
@@ -34,7 +32,7 @@ struct Normals {
 
 }  // namespace
 
-float gridError(const float* interpolated, const float* traced, float floor_lux) {
+float gridError(const float* interpolated, const float* traced, float floor_lux, float error_max) {
     static const Normals normals;
     float sum = 0;
     for (const auto& transfer : normals.transfer) {

@@ -17,7 +17,6 @@ constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
 // Of the number of probes in a round, at most: where there are few, each counts.
 constexpr double growth_of_few = 0.3, growth_of_many = 0.45;
-constexpr size_t few_probes = 1000;
 constexpr uint32_t grow_rounds_max = 64;
 // Few probes are judged at as many places each as all of them are in the end, and this many times more, but not at
 // fewer than so many.

@@ -15,6 +15,9 @@
 namespace dimmer::cook {
 namespace {
 
+// What is hopelessly wrong is not worse than that. Where probes are few, a leak into the dark may be all that one
+// spoils; where they are many, slices as thin as a hand would draw too many of them.
+constexpr float error_max_of_few = 8, error_max_of_many = 2;
 constexpr float importance_floor = 0.05f;  // of the mean light: darker places count no more
 // Of the mean light: errors of what is darker are as small as it. Every group counts alike here, so that faint ones ask
 // for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000.
@@ -32,6 +35,7 @@ TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<c
       states_(states),
       settings_(settings),
       places_(choice.places()),
+      error_max_(choice.probes_max <= few_probes ? error_max_of_few : error_max_of_many),
       first_corner_(places_.size() - choice.blocks.back().places_m.size()),
       search_points_(static_cast<uint32_t>(
           std::clamp<size_t>(search_points_times_probes / choice.probes_max, search_points_min, visibility_points))) {
@@ -229,16 +233,21 @@ void TrialGrid::findVisibility(Asked asked, uint32_t points) {
 float TrialGrid::errorOf(const FitValue& light, const FitValue& traced) const {
     float sum = 0;
     for (size_t state = 0; state < site_states; ++state)
-        sum += gridError(&light[9 * state], &traced[9 * state], floor_lux_);
+        sum += gridError(&light[9 * state], &traced[9 * state], floor_lux_, error_max_);
     return sum / site_states;
 }
 
 // With the light that probes would be given.
 void TrialGrid::findErrors() {
     std::vector<FitValue> probes;
-    for (const uint32_t place : result_.placement.place_of) probes.push_back(states_[place]);
+    std::vector<float> own;
+    for (size_t i = 0; i < result_.placement.place_of.size(); ++i) {
+        const uint32_t place = result_.placement.place_of[i];
+        probes.push_back(states_[place]);
+        own.push_back(result_.placement.guessed[i] ? 0 : importance_[place]);
+    }
     const std::vector<FitSite>& sites = result_.placement.sites;
-    fitProbes(sites, states_.first(sites.size()), probes, search_tolerance, result_.placement.guessed);
+    fitProbes(sites, states_.first(sites.size()), probes, search_tolerance, own);
     result_.errors.resize(sites.size());
     tbb::parallel_for(size_t{0}, sites.size(), [&](size_t i) {
         const FitSite& site = sites[i];

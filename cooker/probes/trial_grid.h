@@ -9,6 +9,9 @@
 
 namespace dimmer::cook {
 
+// Of grids that may have no more than that each probe counts.
+inline constexpr size_t few_probes = 4000;
+
 // Places of SiteChoice without its corners, and the round in which each was taken.
 struct ChosenProbes {
     std::vector<uint32_t> places;
@@ -64,6 +67,7 @@ class TrialGrid {
     std::span<const FitValue> states_;  // per place
     const GridSettings& settings_;
     std::vector<glm::vec3> places_;  // and behind them the free corners of the box
+    float error_max_;
     size_t first_corner_;
     std::vector<uint32_t> corners_;  // per corner: its place, or no_index
     uint32_t search_points_;

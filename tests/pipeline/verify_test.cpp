@@ -90,6 +90,30 @@ TEST(Verify, ARightPackIsFoundRight) {
     }
 }
 
+// Every figure is that of the places listed with it, whatever lists them.
+TEST(Verify, ListsThePlacesBehindItsFigures) {
+    Scene scene = furnace();
+    scene.dynamic_places.emplace_back();  // asks for a global grid
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    SilentProgress progress;
+    const auto report = verify(scene, *pack, quick(), progress);
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_GT(report->grid.points, 0u);
+    std::map<std::string, std::vector<LightPair>> by_kind;
+    for (const MeasuredPlace& p : report->places) {
+        EXPECT_LE(glm::length(glm::max(glm::abs(p.position_m) - glm::vec3(1, 1.5f, 2), 0.0f)), 1e-4f);  // in the box
+        EXPECT_NEAR(glm::length(p.normal), 1, 1e-5);
+        by_kind[p.kind].push_back(p.light);
+    }
+    EXPECT_EQ(by_kind.size(), 3u);  // no models
+    for (const auto& [kind, figures] :
+         {std::pair("surface", report->surface), {"tilted", report->tilted}, {"grid", report->grid}}) {
+        EXPECT_EQ(by_kind[kind].size(), figures.points) << kind;
+        EXPECT_DOUBLE_EQ(lightError(by_kind[kind], report->floor_lux).rmse, figures.rmse) << kind;
+    }
+}
+
 // The same pack with half the light in its records: 50 % off, and said so.
 TEST(Verify, AWrongPackIsFoundWrong) {
     const Scene scene = furnace();

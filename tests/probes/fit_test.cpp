@@ -63,8 +63,8 @@ TEST(ProbeFit, KeepsWhatIsRight) {
         for (size_t c = 0; c < 27; ++c) EXPECT_NEAR(probes[i][c], right[i][c], 1e-4);  // 32-bit sums
 }
 
-// From a prior that is wrong everywhere, most of the error goes. The prior weighs 5 %, so at the optimum what is left
-// of the squares is at most 5 % of what the prior's distance to the right light would cost, which the diagonal bounds.
+// From a prior that is wrong everywhere, most of the error goes. The prior weighs 1 %, so at the optimum what is left
+// of the squares is at most 1 % of what the prior's distance to the right light would cost, which the diagonal bounds.
 TEST(ProbeFit, FindsTheLightThatExplainsTheSites) {
     Random random(2);
     const auto sites = randomSites(random, 40, 2000);
@@ -76,7 +76,7 @@ TEST(ProbeFit, FindsTheLightThatExplainsTheSites) {
     for (const FitSite& s : sites)
         for (size_t k = 0; k < 4; ++k)
             for (size_t c = 0; c < 27; ++c)
-                bound += 0.05 * static_cast<double>(s.importance * s.shares[k] * s.shares[k]) *
+                bound += 0.01 * static_cast<double>(s.importance * s.shares[k] * s.shares[k]) *
                          std::pow(static_cast<double>(probes[s.probes[k]][c] - right[s.probes[k]][c]), 2);
     fitProbes(sites, targets, probes);
     EXPECT_LE(squares(sites, targets, probes), bound);
@@ -92,7 +92,7 @@ TEST(ProbeFit, IsTheMinimum) {
     std::vector<double> weight(12, 0);
     for (const FitSite& s : sites)
         for (size_t k = 0; k < 4; ++k)
-            weight[s.probes[k]] += 0.05 * static_cast<double>(s.importance * s.shares[k] * s.shares[k]);
+            weight[s.probes[k]] += 0.01 * static_cast<double>(s.importance * s.shares[k] * s.shares[k]);
     const auto energy = [&](std::span<const FitValue> x) {
         double sum = squares(sites, targets, x);
         for (size_t i = 0; i < 12; ++i)
@@ -119,15 +119,36 @@ TEST(ProbeFit, GuessesHaveNoSay) {
     even.fill(3);
     const std::vector<FitValue> targets(sites.size(), even);
     std::vector<FitValue> probes(40, even);
-    std::vector<uint8_t> guessed(40, 0);
+    std::vector<float> own(40, 1);
     for (const size_t i : {7u, 21u}) {
         probes[i].fill(1000);
-        guessed[i] = 1;
+        own[i] = 0;
     }
-    fitProbes(sites, targets, probes, 1e-3f, guessed);
+    fitProbes(sites, targets, probes, 1e-3f, own);
     // The tolerance is 0.001 of all light, that of 40 probes.
     for (const FitValue& v : probes)
         for (const float x : v) EXPECT_NEAR(x, 3, 3 * 0.001f * std::sqrt(40.0f));
+}
+
+// A probe beside a lamp has a hundred thousand times the light of the places around, and is not asked for them: of
+// sites with importance 1, share a and target t, and a prior p of importance o, the minimum of sum a^2 (x - t)^2 +
+// 0.01 o sum a^2 (x - p)^2 is x = (t + 0.01 o p) / (1 + 0.01 o).
+TEST(ProbeFit, LightBesideALampIsNotTakenFarther) {
+    FitValue here, around;
+    here.fill(1e5f);
+    around.fill(3);
+    FitSite site{.probes = {0, 1, 1, 1}, .shares = {0.25f, 0, 0, 0}};
+    const std::vector<FitSite> sites(20, site);
+    FitValue seen = around;
+    for (float& v : seen) v *= 0.25f;
+    const std::vector<FitValue> targets(20, seen);
+    for (const float own : {1e-6f, 1e-3f, 1.0f, 50.0f}) {
+        std::vector<FitValue> probes = {here, around};
+        fitProbes(sites, targets, probes, 1e-3f, std::vector<float>{own, 1});
+        const float prior = 0.01f * std::min(own, 1.0f);  // no more than what the sites count
+        EXPECT_NEAR(probes[0][0], (3 + prior * 1e5f) / (1 + prior), 1e-3f * (3 + prior * 1e5f)) << own;
+        EXPECT_EQ(probes[1], around);
+    }
 }
 
 }  // namespace
