@@ -22,14 +22,12 @@ class LightmapFilter {
         : unwrap_(unwrap), texels_(texels), light_(light), step_(step) {}
 
     void filter(size_t receiver, std::vector<ReceiverLight>& row) const {
-        const uint32_t address = texels_.address[receiver];
-        const Chart& chart = chartOf(receiver);
         const auto here = light_.row(receiver);
         row.assign(here.begin(), here.end());
         std::vector<Sum> sums(here.size());
         for (int dy = -2; dy <= 2; ++dy)
             for (int dx = -2; dx <= 2; ++dx) {
-                const size_t other = neighbour(address, chart, dx * step_, dy * step_);
+                const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx * step_, dy * step_);
                 if (other == no_index) continue;
                 const float spatial =
                     kernel[static_cast<size_t>(std::abs(dx))] * kernel[static_cast<size_t>(std::abs(dy))];
@@ -44,14 +42,12 @@ class LightmapFilter {
 
     // Replaces each variance by the mean over the neighbours of the same term.
     void smoothVariance(size_t receiver, std::vector<ReceiverLight>& row) const {
-        const uint32_t address = texels_.address[receiver];
-        const Chart& chart = chartOf(receiver);
         const auto here = light_.row(receiver);
         row.assign(here.begin(), here.end());
         std::vector<float> counts(here.size(), 1);
         for (int dy = -variance_reach; dy <= variance_reach; ++dy)
             for (int dx = -variance_reach; dx <= variance_reach; ++dx) {
-                const size_t other = neighbour(address, chart, dx, dy);
+                const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx, dy);
                 if (other == no_index || other == receiver) continue;
                 forEachCommon(here, light_.row(other), [&](size_t i, const ReceiverLight& o) {
                     row[i].variance += o.variance;
@@ -66,27 +62,6 @@ class LightmapFilter {
         Gathered light;
         float weight = 0, variance = 0;
     };
-
-    size_t neighbour(uint32_t address, const Chart& chart, int dx, int dy) const {
-        const int x = static_cast<int>(TexelAddress::x(address)) + dx,
-                  y = static_cast<int>(TexelAddress::y(address)) + dy;
-        if (x < static_cast<int>(chart.x) || y < static_cast<int>(chart.y) ||
-            x >= static_cast<int>(chart.x + chart.width) || y >= static_cast<int>(chart.y + chart.height))
-            return no_index;
-        const uint32_t found =
-            texels_
-                .receiver_at[(size_t{chart.page} * unwrap_.page_height + static_cast<size_t>(y)) * unwrap_.page_width +
-                             static_cast<size_t>(x)];
-        // Copies of a receiver (padding) do not count twice.
-        const bool own =
-            found != no_index && texels_.address[found] ==
-                                     TexelAddress::pack(chart.page, static_cast<uint32_t>(x), static_cast<uint32_t>(y));
-        return own ? found : no_index;
-    }
-
-    const Chart& chartOf(size_t receiver) const {
-        return unwrap_.charts[unwrap_.face_chart[texels_.sample(receiver, 0).face]];
-    }
 
     // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
     static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {

@@ -18,6 +18,8 @@ namespace {
 // 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss. Larger thresholds
 // let no more go: the series, and so what is cached of it, is the same for all of them.
 constexpr float lingering_share = 0.01f;
+// Texels to each side that tell whether light is active at one.
+constexpr int activity_reach = 2;
 constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
@@ -353,20 +355,59 @@ class Expansion {
                                    [&](uint32_t door) { return paths_.terms()[term].isAbout(door); });
     }
 
+    // By bounced light over neighbouring texels: by its own few rays a receiver that saw little would be cut and its
+    // neighbour that saw much be kept, which leaves faint light too dark and terms' regions ragged.
     void decideActivity() {
         out_.reports = thresholds(1);
         for (uint32_t t = 0; t < terms_; ++t) {
             const float share = settings_.thresholdOf(paths_.terms()[t].group);
             out_.threshold_base.push_back(share > 0 ? out_.reports[t].threshold_lux / share : 0.0f);
         }
+        SparseLight active = activeAround(out_.bounced);
         std::vector<double> dropped(terms_);
-        forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
+        forEachPair([&](size_t i, uint32_t t, float direct, float, float stored) {
             const double energy = static_cast<double>(gatherer_.areaM2(i) * stored);
             out_.reports[t].energy += energy;
-            if (!out_.active(t, direct, bounced)) dropped[t] += energy;
+            const auto row = active.row(i);
+            if (!out_.active(t, direct, 0) && std::ranges::find(row, t, &TermLight::term) == row.end())
+                dropped[t] += energy;
         });
         for (uint32_t t = 0; t < terms_; ++t)
             if (out_.reports[t].energy > 0) out_.reports[t].energy_dropped = dropped[t] / out_.reports[t].energy;
+        out_.bounced = std::move(active);
+    }
+
+    // The mean of what the texels around in the same chart have (models' receivers: their own), where it is active.
+    SparseLight activeAround(const SparseLight& bounced) const {
+        const size_t texels = gatherer_.texels().size();
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+            TermAccumulator<glm::vec3> sum(terms_);
+            for (uint32_t t = 0; t < terms_; ++t) sum.setWanted(t, true);
+            std::vector<TermLight> row;
+            for (size_t i = begin; i < end; ++i) {
+                float count = 0;
+                const auto add = [&](size_t receiver) {
+                    ++count;
+                    for (const TermLight& l : bounced.row(receiver)) sum[l.term] += l.value;
+                };
+                if (i < texels)
+                    forEachAround(i, add);
+                else
+                    add(i);
+                takeRow(sum, row);
+                for (TermLight& l : row) l.value /= count;
+                std::erase_if(row, [&](const TermLight& l) { return !out_.active(l.term, 0, luminance(l.value)); });
+                emit(std::span<const TermLight>(row));
+            }
+        });
+    }
+
+    void forEachAround(size_t texel, auto&& visit) const {
+        for (int dy = -activity_reach; dy <= activity_reach; ++dy)
+            for (int dx = -activity_reach; dx <= activity_reach; ++dx) {
+                const uint32_t other = neighbourInChart(gatherer_.unwrap(), gatherer_.texels(), texel, dx, dy);
+                if (other != no_index) visit(other);
+            }
     }
 
     // visit(receiver, term, direct, bounced, storable), luminances in lux, for every pair that has light. Storable is

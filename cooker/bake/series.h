@@ -15,7 +15,7 @@ bool isActive(const TermReport& report, uint32_t term, float direct_lux, float b
 
 struct Series {
     SparseLight direct;                   // irradiance from punctual lights, emitters and the sky, lux
-    SparseLight bounced;                  // irradiance after one bounce or more, lux
+    SparseLight bounced;                  // after one bounce or more, lux: over the texels around, where active
     SparseLight left_to_renderer;         // the part of `direct` that renderers draw themselves and no pack stores
     Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
     SparseLight radiance;                 // what leaves each receiver, cd/m2

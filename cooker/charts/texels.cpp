@@ -221,6 +221,23 @@ Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples
     return out;
 }
 
+uint32_t neighbourInChart(const Unwrap& unwrap, const Texels& texels, size_t receiver, int dx, int dy) {
+    const uint32_t address = texels.address[receiver];
+    const Chart& chart = unwrap.charts[unwrap.face_chart[texels.sample(receiver, 0).face]];
+    const int x = static_cast<int>(TexelAddress::x(address)) + dx, y = static_cast<int>(TexelAddress::y(address)) + dy;
+    if (x < static_cast<int>(chart.x) || y < static_cast<int>(chart.y) ||
+        x >= static_cast<int>(chart.x + chart.width) || y >= static_cast<int>(chart.y + chart.height))
+        return no_index;
+    const uint32_t found =
+        texels.receiver_at[(size_t{chart.page} * unwrap.page_height + static_cast<size_t>(y)) * unwrap.page_width +
+                           static_cast<size_t>(x)];
+    // Copies of a receiver (padding) do not count twice.
+    const bool own =
+        found != no_index &&
+        texels.address[found] == TexelAddress::pack(chart.page, static_cast<uint32_t>(x), static_cast<uint32_t>(y));
+    return own ? found : no_index;
+}
+
 uint32_t receiverOf(const Unwrap& unwrap, const Texels& texels, const Hit& hit) {
     const uint32_t face = unwrap.faceOf(hit.triangle, hit.back);
     if (face == no_index) return no_index;

@@ -40,6 +40,9 @@ struct Texels {
 // door's leaf, they stay: an opening uncovers them. Deterministic.
 Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max);
 
+// The receiver so many texels away in the same chart; no_index where the chart has none of its own there.
+uint32_t neighbourInChart(const Unwrap& unwrap, const Texels& texels, size_t receiver, int dx, int dy);
+
 // Which receiver a ray's hit reads; no_index for surfaces that receive no light.
 uint32_t receiverOf(const Unwrap& unwrap, const Texels& texels, const Hit& hit);
 

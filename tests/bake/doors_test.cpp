@@ -322,7 +322,7 @@ TEST(Doors, FaintLightThroughADoorIsKeptWhereItIsAllThereIs) {
                100 * noise, 100 * lost);
         // 3 % for what lies below the thresholds, 2 % for the texels' size and the baker's own noise.
         EXPECT_NEAR(error, 0, 0.05 + 4 * noise) << set;
-        EXPECT_GT(lost, 0.15) << set;
+        EXPECT_GT(lost, 0.05) << set;  // more than what is allowed of what is kept
     }
     for (size_t t = 0; t < kept.baked.terms.size(); ++t) {
         if (kept.baked.terms[t].free()) continue;
@@ -330,6 +330,32 @@ TEST(Doors, FaintLightThroughADoorIsKeptWhereItIsAllThereIs) {
         EXPECT_LE(least, most) << t;
         EXPECT_GE(least, 0.199f * most) << t;
     }
+}
+
+// Faint light that changes slowly is active in one piece: no texel without it among four that have it, none with it
+// among four that do not. By each texel's own few rays alone 4 % are one or the other.
+TEST(Doors, FaintLightIsActiveInOnePiece) {
+    const Scene scene = brightAndDark();
+    BakedScene b(scene);
+    b.bake({.series_rays = 32, .final_rays = 32, .emitter_samples = 0});
+    size_t with = 0, odd = 0;
+    for (uint32_t t = 0; t < b.baked.terms.size(); ++t) {
+        if (b.baked.terms[t].doors_open.empty()) continue;
+        const auto has = [&](size_t i) {
+            return std::ranges::find(b.baked.light.row(i), t, &ReceiverLight::term) != b.baked.light.row(i).end();
+        };
+        for (size_t i = 0; i < b.texels.size(); ++i) {
+            size_t neighbours = 0, having = 0;
+            for (const auto& [dx, dy] : {std::pair(-1, 0), {1, 0}, {0, -1}, {0, 1}})
+                if (const uint32_t n = neighbourInChart(b.charts, b.texels, i, dx, dy); n != no_index)
+                    ++neighbours, having += has(n);
+            with += has(i);
+            odd += neighbours == 4 && (has(i) ? having == 0 : having == 4);
+        }
+    }
+    printf("%zu of %zu texels are odd\n", odd, with);
+    ASSERT_GT(with, 1000u);
+    EXPECT_LE(odd, with / 200);
 }
 
 }  // namespace
