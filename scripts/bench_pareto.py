@@ -103,7 +103,7 @@ class Level:
                            "--cache", self.cache)
                 dimmer("verify", self.path, pack, "--no-sets", "--points", 300, "--state", text, "--csv", file,
                        "--seed", 1 + number)
-            rows = list(csv.DictReader(file.open()))
+            rows = [r for r in csv.DictReader(file.open()) if r.get("kind", "surface") == "surface"]
             points = self.folder / f"points_{number}.csv"
             points.write_text("x,y,z,nx,ny,nz\n" + "".join(
                 ",".join(r[c] for c in ("x", "y", "z", "nx", "ny", "nz")) + "\n" for r in rows))

@@ -42,6 +42,12 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
             if (remembers) all_ends.push_back(own_ends);
             for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
                 traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
+            // Neighbours' light may end at a wall that the chart runs under.
+            std::erase_if(row, [&](const ReceiverLight& l) {
+                return l.term != always_group && l.light.irradiance_lux == glm::vec3(0) &&
+                       std::ranges::find(series.stored_direct.row(i), l.term, &ReceiverLight::term) ==
+                           series.stored_direct.row(i).end();
+            });
             for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));
         }

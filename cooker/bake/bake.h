@@ -72,7 +72,7 @@ struct TermReport {
     float mean_lux = 0;  // luminance
     float threshold_lux = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
-    double energy_dropped = 0;  // share of it at receivers below the threshold, 0..1
+    double energy_dropped = 0;  // share of it at receivers where the term is not active, 0..1
 };
 
 struct BakedGrid {

@@ -20,6 +20,7 @@ namespace {
 constexpr float lingering_share = 0.01f;
 // Texels to each side that tell whether light is active at one.
 constexpr int activity_reach = 2;
+constexpr float around_texel_sizes = 4;  // from corner to corner of so many texels, wherever in them samples lie
 constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
@@ -382,7 +383,6 @@ class Expansion {
         const size_t texels = gatherer_.texels().size();
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
-            for (uint32_t t = 0; t < terms_; ++t) sum.setWanted(t, true);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
                 float count = 0;
@@ -402,11 +402,19 @@ class Expansion {
         });
     }
 
+    // Charts that came with the level may hold islands that only the page has side by side.
+    bool nearInSpace(size_t a, size_t b) const {
+        const Texels& texels = gatherer_.texels();
+        const float size_m = std::sqrt(std::max(texels.area_m2[a], texels.area_m2[b]));
+        return glm::distance(texels.sample(a, 0).position_m, texels.sample(b, 0).position_m) <=
+               around_texel_sizes * size_m;
+    }
+
     void forEachAround(size_t texel, auto&& visit) const {
         for (int dy = -activity_reach; dy <= activity_reach; ++dy)
             for (int dx = -activity_reach; dx <= activity_reach; ++dx) {
                 const uint32_t other = neighbourInChart(gatherer_.unwrap(), gatherer_.texels(), texel, dx, dy);
-                if (other != no_index) visit(other);
+                if (other != no_index && nearInSpace(texel, other)) visit(other);
             }
     }
 

@@ -7,7 +7,7 @@
 namespace dimmer::cook {
 namespace {
 
-// What is traced at a probe itself counts as much as this share of its sites.
+// What is traced at a probe itself counts as much as this share of its sites at most.
 constexpr float prior_share = 0.01f;
 constexpr int steps_max = 24;  // some 3 digits, with neighbours coupled as closely as tetrahedra couple them
 

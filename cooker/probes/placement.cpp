@@ -17,6 +17,7 @@ constexpr float coarse_spacing_m = 4;  // of the first probes
 constexpr float sparse_spacing = 2;    // outside of play areas
 // Of the number of probes in a round, at most: where there are few, each counts.
 constexpr double growth_of_few = 0.3, growth_of_many = 0.45;
+constexpr size_t few_probes_to_grow = 1000;
 constexpr uint32_t grow_rounds_max = 64;
 // Few probes are judged at as many places each as all of them are in the end, and this many times more, but not at
 // fewer than so many.
@@ -268,7 +269,7 @@ class Placer {
         for (auto& [t, cell] : cells) order.push_back(&cell);
         std::ranges::stable_sort(order, [](const Cell* a, const Cell* b) { return a->sum > b->sum; });
         const size_t before = probes_.places.size();
-        const double growth = limit_ <= few_probes ? growth_of_few : growth_of_many;
+        const double growth = limit_ <= few_probes_to_grow ? growth_of_few : growth_of_many;
         const size_t most =
             std::min(limit_, before + std::max<size_t>(8, static_cast<size_t>(growth * static_cast<double>(before))));
         ++level_;

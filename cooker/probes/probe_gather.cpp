@@ -42,7 +42,7 @@ uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::span<const u
     return shadow_rays + traced + settings_.series_rays;
 }
 
-// As for texels: lit straight, or by as much as the term's threshold asks.
+// Lit straight, or by as much as the term's threshold asks: by own rays, where texels look at their neighbours' too.
 template <class Light>
 uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from, std::span<const uint8_t> groups) {
     const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, stored_);

@@ -18,6 +18,7 @@ namespace {
 // What is hopelessly wrong is not worse than that. Where probes are few, a leak into the dark may be all that one
 // spoils; where they are many, slices as thin as a hand would draw too many of them.
 constexpr float error_max_of_few = 8, error_max_of_many = 2;
+constexpr size_t few_probes = 4000;
 constexpr float importance_floor = 0.05f;  // of the mean light: darker places count no more
 // Of the mean light: errors of what is darker are as small as it. Every group counts alike here, so that faint ones ask
 // for probes as bright ones do: at 0.01, the floor of error measures, lq_old_start gets 18,000.

@@ -9,9 +9,6 @@
 
 namespace dimmer::cook {
 
-// Of grids that may have no more than that each probe counts.
-inline constexpr size_t few_probes = 4000;
-
 // Places of SiteChoice without its corners, and the round in which each was taken.
 struct ChosenProbes {
     std::vector<uint32_t> places;

@@ -130,23 +130,24 @@ TEST(ProbeFit, GuessesHaveNoSay) {
         for (const float x : v) EXPECT_NEAR(x, 3, 3 * 0.001f * std::sqrt(40.0f));
 }
 
-// A probe beside a lamp has a hundred thousand times the light of the places around, and is not asked for them: of
-// sites with importance 1, share a and target t, and a prior p of importance o, the minimum of sum a^2 (x - t)^2 +
-// 0.01 o sum a^2 (x - p)^2 is x = (t + 0.01 o p) / (1 + 0.01 o).
+// A probe beside a lamp has three hundred times the light of the places around, and is not asked for them: of
+// sites with importance 2, share a and target t, and a prior p of importance o, the minimum of sum 2 a^2 (x - t)^2 +
+// 0.01 min(o, 2) sum a^2 (x - p)^2 is x = (2 t + w p) / (2 + w), with w = 0.01 min(o, 2).
 TEST(ProbeFit, LightBesideALampIsNotTakenFarther) {
-    FitValue here, around;
-    here.fill(1e5f);
+    FitValue here, around, seen;
+    here.fill(1000);
     around.fill(3);
-    FitSite site{.probes = {0, 1, 1, 1}, .shares = {0.25f, 0, 0, 0}};
+    seen.fill(0.3f * 3);
+    const FitSite site{.probes = {0, 1, 1, 1}, .shares = {0.3f, 0, 0, 0}, .importance = 2};
     const std::vector<FitSite> sites(20, site);
-    FitValue seen = around;
-    for (float& v : seen) v *= 0.25f;
     const std::vector<FitValue> targets(20, seen);
     for (const float own : {1e-6f, 1e-3f, 1.0f, 50.0f}) {
         std::vector<FitValue> probes = {here, around};
         fitProbes(sites, targets, probes, 1e-3f, std::vector<float>{own, 1});
-        const float prior = 0.01f * std::min(own, 1.0f);  // no more than what the sites count
-        EXPECT_NEAR(probes[0][0], (3 + prior * 1e5f) / (1 + prior), 1e-3f * (3 + prior * 1e5f)) << own;
+        const float prior = 0.01f * std::min(own, 2.0f);
+        const float best = (2 * 3 + prior * 1000) / (2 + prior);
+        // Of what is fitted the tolerance, and of what it starts from the rounding.
+        EXPECT_NEAR(probes[0][0], best, 1e-3f * best + 4 * 1000 * 0x1p-23f) << own;
         EXPECT_EQ(probes[1], around);
     }
 }
