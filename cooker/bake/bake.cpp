@@ -44,9 +44,9 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
                 traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
             // Neighbours' light may end at a wall that the chart runs under.
             std::erase_if(row, [&](const ReceiverLight& l) {
+                const auto lit = series.direct.row(i);
                 return l.term != always_group && l.light.irradiance_lux == glm::vec3(0) &&
-                       std::ranges::find(series.stored_direct.row(i), l.term, &ReceiverLight::term) ==
-                           series.stored_direct.row(i).end();
+                       std::ranges::find(lit, l.term, &TermLight::term) == lit.end();
             });
             for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));
