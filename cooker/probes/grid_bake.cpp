@@ -11,7 +11,7 @@ namespace {
 
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
-constexpr float fit_tolerance = 0.01f;  // 0.001 moves no error by a tenth of a point, and takes three times the steps
+constexpr float fit_tolerance = 0.01f;  // errors of interpolation are several times that
 
 // Per position, ascending: the terms of its own place and of the places that it counts at; with the light that was
 // traced at its own.
