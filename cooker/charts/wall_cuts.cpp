@@ -225,7 +225,11 @@ class WallCutter {
         for (const Cut& c : cuts) {
             const int along = 1 - c.axis;
             if (c.at < low[c.axis] + margin_m || c.at > high[c.axis] - margin_m) continue;
-            const float length = std::min(c.to, high[along]) - std::max(c.from, low[along]);
+            // With what goes on beyond doorways: at a few texels per metre no stretch between them is long.
+            float length = 0;
+            for (const Cut& o : cuts)
+                if (o.axis == c.axis && std::abs(o.at - c.at) < same_line_m)
+                    length += std::max(0.0f, std::min(o.to, high[along]) - std::max(o.from, low[along]));
             const float needed = std::min(length_min_texels / texels_per_metre, 0.5f * (high[along] - low[along]));
             if (length < needed || length <= best_length) continue;
             best = &c;
