@@ -120,12 +120,6 @@ struct SiteBlock {
     bool operator==(const SiteBlock&) const = default;
 };
 
-// The light of one group at the places of a block: what is active there; `term` counts the group's own.
-struct SiteBlockLight {
-    SiteBlock block;
-    Sparse<ProbeTermLight> light;
-};
-
 // All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings
 // alone, so that a store can keep it.
 struct GroupLight {
@@ -150,10 +144,12 @@ class GroupStore {
     // Places in the open of this geometry, of one kind: `what` tells it from others.
     virtual std::optional<std::vector<glm::vec3>> findPlaces(std::span<const float> what) = 0;
     virtual void keepPlaces(std::span<const float> what, std::span<const glm::vec3> places) = 0;
-    // What earlier bakes know of a group's light in the open: of some of `blocks`, which count as reused when all are
-    // known, or of others.
-    virtual std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) = 0;
-    virtual void keepSites(uint32_t group, std::span<const SiteBlockLight> light) = 0;
+    // The light of a group at the places of each block: what is active there; `term` counts the group's own. No rows:
+    // not known.
+    virtual std::vector<Sparse<ProbeTermLight>> findSites(uint32_t group, std::span<const SiteBlock> blocks) = 0;
+    // `fresh`: which of them are new.
+    virtual void keepSites(uint32_t group, std::span<const SiteBlock> blocks,
+                           std::span<const Sparse<ProbeTermLight>> light, std::span<const size_t> fresh) = 0;
     // Series::radiance, of the group's own terms: what light at new places is gathered from.
     virtual std::optional<SparseLight> findRadiance(uint32_t group) = 0;
     virtual void keepRadiance(uint32_t group, const SparseLight& radiance) = 0;

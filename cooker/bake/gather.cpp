@@ -189,9 +189,9 @@ bool Gatherer::brings(uint32_t end, const GatherFrom& from, const SparseLight* o
         const uint32_t term = paths_.term(always_group, free_path);
         return term != no_term && sum.wants(term);
     }
-    if (!outgoing) return false;
+    if (!outgoing || !outgoing->any(end)) return false;
     const auto light = outgoing->row(end);
-    if (from.condition != no_condition) return !light.empty();
+    if (from.condition != no_condition) return true;
     return std::ranges::any_of(light, [&](const TermLight& l) { return sum.wants(l.term); });
 }
 

@@ -38,8 +38,11 @@ template <class Entry>
 class Sparse {
    public:
     std::span<const Entry> row(size_t i) const { return {entries_.data() + first_[i], first_[i + 1] - first_[i]}; }
+    // Whether a row has entries, from a bit of it: of a light set alone most rows have none, and rays end anywhere.
+    bool any(size_t i) const { return any_[i / 64] >> i % 64 & 1; }
     // Begins to load a row that is asked for soon.
     void prefetch(size_t i) const {
+        if (!any(i)) return;
         constexpr size_t line_bytes = 64, lines_max = 4;
         const auto* line = reinterpret_cast<const char*>(entries_.data() + first_[i]);
         const auto* end = reinterpret_cast<const char*>(entries_.data() + first_[i + 1]);
@@ -47,7 +50,7 @@ class Sparse {
     }
     size_t rows() const { return first_.size() - 1; }
     size_t entryCount() const { return entries_.size(); }
-    size_t bytes() const { return first_.size() * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
+    size_t bytes() const { return (first_.size() + any_.size()) * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
 
     // change(entry) for every entry, in parallel.
     void forEach(auto&& change) {
@@ -72,7 +75,11 @@ class Sparse {
         Sparse finish() {
             Sparse out;
             out.first_ = std::move(first_);
-            for (size_t i = 0; i < rows_; ++i) out.first_[i + 1] += out.first_[i];
+            out.any_.resize(rows_ / 64 + 1);
+            for (size_t i = 0; i < rows_; ++i) {
+                out.any_[i / 64] |= uint64_t{out.first_[i + 1] > 0} << i % 64;
+                out.first_[i + 1] += out.first_[i];
+            }
             out.entries_.reserve(out.first_[rows_]);
             for (auto& part : parts_) {
                 out.entries_.insert(out.entries_.end(), part.begin(), part.end());
@@ -100,6 +107,7 @@ class Sparse {
 
    private:
     std::vector<uint64_t> first_ = {0};
+    std::vector<uint64_t> any_;  // a bit per row
     std::vector<Entry> entries_;
 };
 

@@ -142,6 +142,13 @@ std::optional<Sparse<Entry>> getRows(ByteReader& in) {
     return rows.finish();
 }
 
+template <class Entry>
+std::optional<Sparse<Entry>> rowsFromBytes(std::span<const std::byte> bytes) {
+    ByteReader in(bytes);
+    auto light = getRows<Entry>(in);
+    return light && in.atEnd() ? std::move(light) : std::nullopt;
+}
+
 void visitGrid(auto& grid, auto&& visit) {
     visit(grid.positions);
     visit(grid.levels);
@@ -238,30 +245,14 @@ std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
     return baked;
 }
 
-std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites) {
+std::vector<std::byte> toBytes(const Sparse<ProbeTermLight>& light) {
     ByteWriter out;
-    out.put(uint64_t{sites.size()});
-    for (const SiteBlockLight& s : sites) {
-        putAll(out, s.block.places_m);
-        out.put(s.block.rays);
-        putRows(out, s.light);
-    }
+    putRows(out, light);
     return out.take();
 }
 
-std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::byte> bytes) {
-    ByteReader in(bytes);
-    std::vector<SiteBlockLight> sites;
-    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) {
-        SiteBlockLight s;
-        getAll(in, s.block.places_m);
-        s.block.rays = in.get<uint32_t>();
-        auto light = getRows<ProbeTermLight>(in);
-        if (!light || light->rows() != s.block.places_m.size()) return {};
-        s.light = std::move(*light);
-        sites.push_back(std::move(s));
-    }
-    return in.atEnd() ? std::optional(std::move(sites)) : std::nullopt;
+std::optional<Sparse<ProbeTermLight>> probeLightFromBytes(std::span<const std::byte> bytes) {
+    return rowsFromBytes<ProbeTermLight>(bytes);
 }
 
 std::vector<std::byte> toBytes(const SparseLight& radiance) {
@@ -271,9 +262,7 @@ std::vector<std::byte> toBytes(const SparseLight& radiance) {
 }
 
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes) {
-    ByteReader in(bytes);
-    auto light = getRows<TermLight>(in);
-    return light && in.atEnd() ? std::move(light) : std::nullopt;
+    return rowsFromBytes<TermLight>(bytes);
 }
 
 }  // namespace dimmer::cook

@@ -29,8 +29,8 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes);
 std::vector<std::byte> toBytes(const BakedGrid& grid);
 std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes);
 
-std::vector<std::byte> toBytes(std::span<const SiteBlockLight> sites);
-std::optional<std::vector<SiteBlockLight>> sitesFromBytes(std::span<const std::byte> bytes);
+std::vector<std::byte> toBytes(const Sparse<ProbeTermLight>& light);
+std::optional<Sparse<ProbeTermLight>> probeLightFromBytes(std::span<const std::byte> bytes);
 
 std::vector<std::byte> toBytes(const SparseLight& radiance);
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes);

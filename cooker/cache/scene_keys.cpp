@@ -188,6 +188,10 @@ Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> 
     return KeyBuilder("rays").add(scene).add(kind).addArray(places).finish();
 }
 
+Key sitesKey(const Key& group, const SiteBlock& block) {
+    return KeyBuilder("sites").add(group).add(block.rays).addArray(std::span(block.places_m)).finish();
+}
+
 Key placesKey(const Key& scene, std::span<const float> what) {
     return KeyBuilder("places").add(scene).addArray(what).finish();
 }

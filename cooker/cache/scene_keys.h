@@ -35,6 +35,9 @@ Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene);
 // Of some rays, from `places` where they start from no receivers.
 Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> places);
 
+// Of a light group's light at places in the open.
+Key sitesKey(const Key& group, const SiteBlock& block);
+
 // Places in the open.
 Key placesKey(const Key& scene, std::span<const float> what);
 

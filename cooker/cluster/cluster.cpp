@@ -4,9 +4,12 @@
 #include <encode/encode_probe.h>
 #include <pack/batches.h>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <functional>
 #include <map>
+#include <numeric>
 
 namespace dimmer::cook {
 namespace {
@@ -97,25 +100,26 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
 // `receiverOf(item)`: its address or number; `lightOf(item)`: its row; `encode(light)`: a record; `cut(first, count)`
 // appends the batches of a cluster's receivers. Returns the number of records per contribution.
 template <class Record>
-std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions,
-                                 std::span<const uint32_t> contribution_of_term, Tables<Record> tables,
+std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions, Tables<Record> tables,
                                  auto&& receiverOf, auto&& lightOf, auto&& encode, auto&& cut) {
     std::vector<uint32_t> record_counts(contributions, 0);
-    std::vector<std::vector<Record>> payloads(contributions);
-    for (const auto* cluster : grouping.ordered()) {
-        for (uint32_t item : cluster->second) {
-            tables.receivers.push_back(receiverOf(item));
-            for (const auto& l : lightOf(item))
-                if (l.term != always_group) payloads[contribution_of_term[l.term]].push_back(encode(l.light));
-        }
+    const auto clusters = grouping.ordered();
+    for (const auto* cluster : clusters) {
+        for (uint32_t item : cluster->second) tables.receivers.push_back(receiverOf(item));
         appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), tables, record_counts, cut);
     }
-    std::vector<uint32_t> first_record;
-    for (const auto& payload : payloads) {
-        first_record.push_back(static_cast<uint32_t>(tables.payload.size()));
-        tables.payload.insert(tables.payload.end(), payload.begin(), payload.end());
-    }
+    std::vector<uint32_t> first_record(contributions + 1, 0);
+    std::partial_sum(record_counts.begin(), record_counts.end(), first_record.begin() + 1);
     for (ClusterTerm& term : tables.terms) term.first_record += first_record[term.contribution];
+    tables.payload.resize(first_record.back());
+    tbb::parallel_for(size_t{0}, clusters.size(), [&](size_t c) {
+        const std::vector<uint32_t>& items = clusters[c]->second;
+        for (size_t i = 0; i < items.size(); ++i) {
+            size_t term = tables.clusters[c].first_term;
+            for (const auto& l : lightOf(items[i]))
+                if (l.term != always_group) tables.payload[tables.terms[term++].first_record + i] = encode(l.light);
+        }
+    });
     return record_counts;
 }
 
@@ -127,15 +131,16 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
     Grouping grouping;
-    for (uint32_t t = 0; t < targets.size(); ++t) {
-        const auto row = baked.light.row(targets[t].source);
-        grouping.add(t, TexelAddress::page(targets[t].address), row, contribution_of_term);
-        for (const ReceiverLight& l : row)
+    for (uint32_t t = 0; t < targets.size(); ++t)
+        grouping.add(t, TexelAddress::page(targets[t].address), baked.light.row(targets[t].source),
+                     contribution_of_term);
+    tbb::parallel_for(size_t{0}, targets.size(), [&](size_t t) {
+        for (const ReceiverLight& l : baked.light.row(targets[t].source))
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
-    }
+    });
     const auto counts = fillTables<TexelRecord>(
-        grouping, pack.contributions.size(), contribution_of_term,
+        grouping, pack.contributions.size(),
         {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
@@ -151,13 +156,13 @@ void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contributi
     const ProbeEncoding encoding{pack.exposure, pack.color_format};
     probes.base.assign(all, encodeProbe({}, encoding));
     Grouping grouping;
-    for (uint32_t i = 0; i < all; ++i) {
-        grouping.add(i, 0, row(i), contribution_of_term);
+    for (uint32_t i = 0; i < all; ++i) grouping.add(i, 0, row(i), contribution_of_term);
+    tbb::parallel_for(size_t{0}, all, [&](size_t i) {
         for (const ProbeTermLight& l : row(i))
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
-    }
+    });
     probes.record_counts = fillTables<ProbeRecord>(
-        grouping, pack.contributions.size(), contribution_of_term,
+        grouping, pack.contributions.size(),
         {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{}, row,
         [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
         [&](uint32_t first, uint32_t count) {

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <sstream>
@@ -103,8 +104,11 @@ Entry CookCache::look(std::string_view kind, const Key& key) {
 }
 
 void CookCache::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) {
-    used_.push_back(CacheStore::nameOf(kind, key));
-    const auto kept = store_.keep(kind, key, bytes);
+    note(CacheStore::nameOf(kind, key), store_.keep(kind, key, bytes));
+}
+
+void CookCache::note(const std::string& name, const Expected<void>& kept) {
+    used_.push_back(name);
     if (!kept && warnings_.empty()) warnings_.push_back("the cache takes no entries: " + kept.error().message);
 }
 
@@ -150,26 +154,45 @@ void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
     keep(grid_kind, key, cook::toBytes(grid));
 }
 
-std::vector<SiteBlockLight> CookCache::findSites(const std::string& what, const Key& key,
-                                                 std::span<const SiteBlock> blocks) {
-    const Entry entry = look(sites_kind, key);
-    std::vector<SiteBlockLight> known;
-    if (entry.find == Find::Hit) known = sitesFromBytes(entry.bytes).value_or(std::vector<SiteBlockLight>{});
-    const auto is_known = [&](const SiteBlock& block) {
-        return block.places_m.empty() || std::ranges::find(known, block, &SiteBlockLight::block) != known.end();
-    };
-    const auto new_blocks = blocks.size() - static_cast<size_t>(std::ranges::count_if(blocks, is_known));
+// An entry per block: what is new is written, and nothing else again.
+std::vector<Sparse<ProbeTermLight>> CookCache::findSites(const std::string& what, const Key& group,
+                                                         std::span<const SiteBlock> blocks) {
+    std::vector<Entry> entries(blocks.size());
+    std::vector<Sparse<ProbeTermLight>> light(blocks.size());
+    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t b) {
+        if (blocks[b].places_m.empty()) return;
+        entries[b] = store_.find(sites_kind, sitesKey(group, blocks[b]));
+        if (entries[b].find == Find::Hit)
+            light[b] = probeLightFromBytes(entries[b].bytes).value_or(Sparse<ProbeTermLight>{});
+    });
+    size_t asked = 0, missing = 0;
+    Find worst = Find::Missing;
+    for (size_t b = 0; b < blocks.size(); ++b) {
+        if (blocks[b].places_m.empty()) continue;
+        ++asked;
+        if (entries[b].find == Find::Hit)
+            used_.push_back(CacheStore::nameOf(sites_kind, sitesKey(group, blocks[b])));
+        else
+            ++missing;
+        if (entries[b].find == Find::Damaged) worst = Find::Damaged;
+    }
     std::string why;
-    if (known.empty())
-        why = whyMissing(entry.find, partsOfGroup(what));
-    else if (new_blocks > 0)
-        why = fmt::format("{} of {} groups of places are new", new_blocks, blocks.size());
-    lines_.push_back({"light at probe places: " + what, new_blocks == 0, why});
-    return known;
+    if (missing == asked || worst == Find::Damaged)
+        why = whyMissing(worst, partsOfGroup(what));
+    else if (missing > 0)
+        why = fmt::format("{} of {} groups of places are new", missing, asked);
+    lines_.push_back({"light at probe places: " + what, missing == 0, missing == 0 ? "" : why});
+    return light;
 }
 
-void CookCache::keepSites(const Key& key, std::span<const SiteBlockLight> sites) {
-    keep(sites_kind, key, cook::toBytes(sites));
+void CookCache::keepSites(const Key& group, std::span<const SiteBlock> blocks,
+                          std::span<const Sparse<ProbeTermLight>> light, std::span<const size_t> fresh) {
+    std::vector<Expected<void>> kept(fresh.size());
+    const auto keyOf = [&](size_t i) { return sitesKey(group, blocks[fresh[i]]); };
+    tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
+        kept[i] = store_.keep(sites_kind, keyOf(i), cook::toBytes(light[fresh[i]]));
+    });
+    for (size_t i = 0; i < fresh.size(); ++i) note(CacheStore::nameOf(sites_kind, keyOf(i)), kept[i]);
 }
 
 std::optional<std::vector<glm::vec3>> CookCache::findPlaces(const Key& key) {
@@ -230,7 +253,7 @@ std::optional<BakedGrid> CachedGroups::findGrid() {
     return cache_.findGrid(grid_, parts);
 }
 
-std::vector<SiteBlockLight> CachedGroups::findSites(uint32_t group, std::span<const SiteBlock> blocks) {
+std::vector<Sparse<ProbeTermLight>> CachedGroups::findSites(uint32_t group, std::span<const SiteBlock> blocks) {
     return cache_.findSites(describeGroup(scene_, group), keys_[group], blocks);
 }
 

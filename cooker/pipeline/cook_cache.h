@@ -46,8 +46,10 @@ class CookCache {
     // `parts`: of all groups, what the grid depends on.
     std::optional<BakedGrid> findGrid(const Key& key, const std::vector<std::string>& parts);
     void keepGrid(const Key& key, const BakedGrid& grid);
-    std::vector<SiteBlockLight> findSites(const std::string& what, const Key& key, std::span<const SiteBlock> blocks);
-    void keepSites(const Key& key, std::span<const SiteBlockLight> sites);
+    std::vector<Sparse<ProbeTermLight>> findSites(const std::string& what, const Key& group,
+                                                  std::span<const SiteBlock> blocks);
+    void keepSites(const Key& group, std::span<const SiteBlock> blocks, std::span<const Sparse<ProbeTermLight>> light,
+                   std::span<const size_t> fresh);
     std::optional<std::vector<glm::vec3>> findPlaces(const Key& key);
     void keepPlaces(const Key& key, std::span<const glm::vec3> places);
     std::optional<SparseLight> findRadiance(const Key& key);
@@ -68,6 +70,7 @@ class CookCache {
                                                const std::vector<std::string>& parts);
     Entry look(std::string_view kind, const Key& key);
     void keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes);
+    void note(const std::string& name, const Expected<void>& kept);
     std::string whyMissing(Find find, const std::vector<std::string>& parts) const;
 
     CacheStore store_;
@@ -94,9 +97,10 @@ class CachedGroups final : public GroupStore {
     void keepPlaces(std::span<const float> what, std::span<const glm::vec3> places) override {
         cache_.keepPlaces(placesKey(rays_, what), places);
     }
-    std::vector<SiteBlockLight> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
-    void keepSites(uint32_t group, std::span<const SiteBlockLight> sites) override {
-        cache_.keepSites(keys_[group], sites);
+    std::vector<Sparse<ProbeTermLight>> findSites(uint32_t group, std::span<const SiteBlock> blocks) override;
+    void keepSites(uint32_t group, std::span<const SiteBlock> blocks, std::span<const Sparse<ProbeTermLight>> light,
+                   std::span<const size_t> fresh) override {
+        cache_.keepSites(keys_[group], blocks, light, fresh);
     }
     std::optional<SparseLight> findRadiance(uint32_t group) override { return cache_.findRadiance(keys_[group]); }
     void keepRadiance(uint32_t group, const SparseLight& radiance) override {

@@ -24,17 +24,24 @@ struct alignas(32) Lanes {
 };
 using Vector = std::vector<Lanes>;
 
-// One conjugate gradient for each of the 27 right-hand sides, side by side.
+// One conjugate gradient for each of the 27 right-hand sides, side by side. Of the normal equations, with their matrix
+// written out: there are several sites to a probe, and a probe has some fifteen neighbours, so that a step over rows
+// moves an eighth of the bytes of one over sites.
 class Solver {
    public:
     Solver(std::span<const FitSite> sites, std::span<const float> own, size_t probes)
-        : sites_(sites), diagonal_(probes, 0), prior_(probes, 1) {  // 1: of what counts nowhere, and stays as it is
+        : sites_(sites), rows_(probes), diagonal_(probes, 0) {
+        for (uint32_t i = 0; i < probes; ++i) rows_[i].add(i, 0);  // found first from now on
         std::vector<float> squares(probes, 0);
         for (const FitSite& s : sites)
             for (size_t k = 0; k < 4; ++k) {
+                if (!(s.shares[k] > 0)) continue;
+                for (size_t o = 0; o < 4; ++o)
+                    if (s.shares[o] > 0) rows_[s.probes[k]].add(s.probes[o], s.importance * s.shares[k] * s.shares[o]);
                 diagonal_[s.probes[k]] += s.importance * s.shares[k] * s.shares[k];
                 squares[s.probes[k]] += s.shares[k] * s.shares[k];
             }
+        prior_.assign(probes, 1);  // of what counts nowhere, and stays as it is
         for (size_t i = 0; i < probes; ++i) {
             const bool known = !own.empty() && own[i] > 0;
             if (diagonal_[i] > 0)
@@ -46,19 +53,16 @@ class Solver {
     void solve(std::span<const FitValue> targets, float tolerance, std::span<FitValue> values) const {
         const size_t n = values.size();
         Vector x(n), residual(n), image(n), direction(n);
+        for (size_t s = 0; s < sites_.size(); ++s) scatter(Lanes(targets[s]), sites_[s], residual);
+        const Lanes enough = powerOfTargets(residual, tolerance);
         for (size_t i = 0; i < n; ++i) x[i] = Lanes(values[i]);
-        for (size_t s = 0; s < sites_.size(); ++s) {
-            Lanes missing(targets[s]);
-            accumulate(missing, sites_[s], x, -1);
-            scatter(missing, sites_[s], residual);
-        }
+        for (size_t i = 0; i < n; ++i) rows_[i].addTo(residual[i], x, -1);
         Lanes power;
         for (size_t i = 0; i < n; ++i)
             for (size_t c = 0; c < Lanes::count; ++c) {
                 direction[i].v[c] = residual[i].v[c] / diagonal_[i];
                 power.v[c] += residual[i].v[c] * direction[i].v[c];
             }
-        const Lanes enough = powerOfTargets(targets, n, tolerance);
         const auto done = [&] { return std::ranges::equal(power.v, enough.v, std::less_equal<>()); };
         for (int step = 0; step < steps_max && !done(); ++step) {
             apply(direction, image);
@@ -83,33 +87,47 @@ class Solver {
     }
 
    private:
+    // A probe's row of the matrix, without its prior.
+    struct MatrixRow {
+        std::vector<uint32_t> probes;
+        std::vector<float> weights;
+
+        void add(uint32_t probe, float weight) {
+            const auto found = std::ranges::find(probes, probe);
+            if (found != probes.end()) {
+                weights[static_cast<size_t>(found - probes.begin())] += weight;
+                return;
+            }
+            probes.push_back(probe);
+            weights.push_back(weight);
+        }
+        void addTo(Lanes& sum, const Vector& x, float sign) const {
+            for (size_t k = 0; k < probes.size(); ++k) sum.add(sign * weights[k], x[probes[k]]);
+        }
+    };
+
     // Below which a residual's power is at most `tolerance`, squared, of that of all light.
-    Lanes powerOfTargets(std::span<const FitValue> targets, size_t n, float tolerance) const {
-        Vector image(n);
-        for (size_t s = 0; s < sites_.size(); ++s) scatter(Lanes(targets[s]), sites_[s], image);
+    Lanes powerOfTargets(const Vector& image, float tolerance) const {
         Lanes power;
-        for (size_t i = 0; i < n; ++i)
+        for (size_t i = 0; i < image.size(); ++i)
             for (size_t c = 0; c < Lanes::count; ++c) power.v[c] += image[i].v[c] * image[i].v[c] / diagonal_[i];
         for (float& p : power.v) p *= tolerance * tolerance;
         return power;
-    }
-    static void accumulate(Lanes& sum, const FitSite& s, const Vector& x, float sign) {
-        for (size_t k = 0; k < 4; ++k) sum.add(sign * s.shares[k], x[s.probes[k]]);
     }
     static void scatter(const Lanes& value, const FitSite& s, Vector& out) {
         for (size_t k = 0; k < 4; ++k) out[s.probes[k]].add(s.importance * s.shares[k], value);
     }
     void apply(const Vector& x, Vector& out) const {
-        for (size_t i = 0; i < x.size(); ++i)
-            for (size_t c = 0; c < Lanes::count; ++c) out[i].v[c] = prior_[i] * x[i].v[c];
-        for (const FitSite& s : sites_) {
+        for (size_t i = 0; i < x.size(); ++i) {
             Lanes sum;
-            accumulate(sum, s, x, 1);
-            scatter(sum, s, out);
+            sum.add(prior_[i], x[i]);
+            rows_[i].addTo(sum, x, 1);
+            out[i] = sum;
         }
     }
 
     std::span<const FitSite> sites_;
+    std::vector<MatrixRow> rows_;
     std::vector<float> diagonal_, prior_;
 };
 

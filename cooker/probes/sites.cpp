@@ -346,12 +346,12 @@ SiteLight::SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, 
     : blocks_(blocks),
       paths_(paths),
       store_(store),
-      light_(paths.groupCount(), std::vector<SiteBlockLight>(blocks.size())) {
-    for (uint32_t g = 0; store && g < paths.groupCount(); ++g)
-        for (SiteBlockLight& known : store->findSites(g, blocks))
-            if (const auto block = std::ranges::find(blocks, known.block);
-                block != blocks.end() && fits(known.light, block->places_m.size(), paths.termsOf(g).size()))
-                light_[g][static_cast<size_t>(block - blocks.begin())] = std::move(known);
+      light_(paths.groupCount(), std::vector<Sparse<ProbeTermLight>>(blocks.size())) {
+    for (uint32_t g = 0; store && g < paths.groupCount(); ++g) {
+        light_[g] = store->findSites(g, blocks);
+        for (size_t b = 0; b < blocks.size(); ++b)
+            if (!fits(light_[g][b], blocks[b].places_m.size(), paths.termsOf(g).size())) light_[g][b] = {};
+    }
 }
 
 std::vector<uint8_t> SiteLight::asked() const {
@@ -418,8 +418,6 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
         rays.keep();
         share(rows, blocks, groups);
     }
-    for (uint32_t g = 0; store_ && g < light_.size(); ++g)
-        if (asked_groups[g]) store_->keepSites(g, light_[g]);
     return traced;
 }
 
@@ -427,8 +425,10 @@ void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks,
     for (const size_t b : blocks) {
         const auto here = rows.first(blocks_[b].places_m.size());
         rows = rows.subspan(here.size());
-        for (const uint32_t g : groups) light_[g][b] = {blocks_[b], ofGroup(here, g)};
+        for (const uint32_t g : groups) light_[g][b] = ofGroup(here, g);
     }
+    for (const uint32_t g : groups)
+        if (store_) store_->keepSites(g, blocks_, light_[g], blocks);
 }
 
 Sparse<ProbeTermLight> SiteLight::take() {
@@ -438,7 +438,7 @@ Sparse<ProbeTermLight> SiteLight::take() {
         for (size_t i = begin; i < end; ++i) {
             row.clear();
             for (uint32_t g = 0; g < paths_.groupCount(); ++g)
-                for (const ProbeTermLight& l : light_[g][order[i].block].light.row(order[i].row))
+                for (const ProbeTermLight& l : light_[g][order[i].block].row(order[i].row))
                     row.push_back({paths_.termsOf(g)[l.term], l.light, 0, 0});
             std::ranges::sort(row, {}, &ProbeTermLight::term);
             emit(std::span<const ProbeTermLight>(row));

@@ -55,12 +55,12 @@ class SiteLight {
     std::vector<uint32_t> missingAt(size_t block) const;
     void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
     Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group) const;
-    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].light.rows() == 0; }
+    bool isMissing(uint32_t group, size_t block) const { return light_[group][block].rows() == 0; }
 
     std::span<const SiteBlock> blocks_;
     const DoorPaths& paths_;
     GroupStore* store_;
-    std::vector<std::vector<SiteBlockLight>> light_;  // per group, per block; no rows: missing
+    std::vector<std::vector<Sparse<ProbeTermLight>>> light_;  // per group, per block; no rows: missing
 };
 
 // What placement looks at: all light together, then each half of the light sets, so that light which leaks from a set's

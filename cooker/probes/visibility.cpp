@@ -88,8 +88,10 @@ class Table {
         TetrahedronVisibility out;
         lendUnseen();
         findRows();
+        group();
         for (size_t v = 0; v < 4; ++v) out.seen[v] = bestRow(v);
         if (!markLonely(out)) return out;
+        group();
         for (size_t v = 0; v < 4; ++v) out.seen[v] = bestRow(v);
         return out;
     }
@@ -185,24 +187,48 @@ class Table {
             }
     }
 
-    // Some number above `most` where it is more than that.
-    uint32_t cost(size_t v, const std::array<int8_t, 4>& row, uint32_t most) const {
-        uint32_t sum = 0;
-        for (const Point& point : points_) {
-            const bool taken_for_seen = value(row, point.at) > 0;
-            if (taken_for_seen == point.seen[v]) continue;
-            sum += draw_scale * (taken_for_seen ? leak_cost : point.miss[v]);
-            if (sum > most) return sum;
+    // Points as cost() reads them, eight at a time: most of the work is there.
+    void group() {
+        points_grouped_.assign((points_.size() + lanes - 1) / lanes, {});
+        for (size_t i = 0; i < points_.size(); ++i) {
+            Group& g = points_grouped_[i / lanes];
+            for (size_t k = 0; k < 4; ++k) {
+                g.at[k][i % lanes] = points_[i].at[k];
+                g.seen[k][i % lanes] = points_[i].seen[k] ? -1 : 0;
+                g.miss[k][i % lanes] = static_cast<int>(draw_scale * points_[i].miss[k]);
+            }
         }
-        for (const Point& point : buried_) sum += value(row, point.at) > 0;
-        return sum;
+        buried_grouped_.assign((buried_.size() + lanes - 1) / lanes, {});
+        for (size_t i = 0; i < buried_.size(); ++i)
+            for (size_t k = 0; k < 4; ++k) buried_grouped_[i / lanes].at[k][i % lanes] = buried_[i].at[k];
+    }
+
+    uint32_t cost(size_t v, const std::array<int8_t, 4>& row) const {
+        std::array<float, 4> field;
+        for (size_t k = 0; k < 4; ++k) field[k] = static_cast<float>(row[k]);
+        IntLanes sum{}, taken_for_seen{};
+        const auto take = [&](const Group& g) {
+            taken_for_seen = g.at[0] * field[0] + g.at[1] * field[1] + g.at[2] * field[2] + g.at[3] * field[3] > 0;
+        };
+        for (const Group& g : points_grouped_) {
+            constexpr int leak = draw_scale * leak_cost;
+            take(g);
+            sum += ((taken_for_seen & leak) | (~taken_for_seen & g.miss[v])) & (taken_for_seen ^ g.seen[v]);
+        }
+        for (const Group& g : buried_grouped_) {
+            take(g);
+            sum -= taken_for_seen;  // -1 each
+        }
+        uint32_t all = 0;
+        for (size_t lane = 0; lane < lanes; ++lane) all += static_cast<uint32_t>(sum[lane]);
+        return all;
     }
 
     std::array<int8_t, 4> bestRow(size_t v) const {
         std::array<int8_t, 4> best = seen_everywhere;
-        uint32_t least = cost(v, best, UINT32_MAX);
+        uint32_t least = cost(v, best);
         const auto consider = [&](const std::array<int8_t, 4>& row) {
-            const uint32_t c = cost(v, row, least);
+            const uint32_t c = cost(v, row);
             if (c < least) least = c, best = row;
         };
         if (least == 0) return best;
@@ -226,11 +252,21 @@ class Table {
         return any;
     }
 
+    static constexpr size_t lanes = 8;
+    using Lanes [[gnu::vector_size(32)]] = float;
+    using IntLanes [[gnu::vector_size(32)]] = int;
+    // No points: at no place, seen by none, so that they cost nothing.
+    struct Group {
+        std::array<Lanes, 4> at{};
+        std::array<IntLanes, 4> seen{}, miss{};  // seen: all bits or none
+    };
+
     const RayScene& rays_;
     const Obstacles& obstacles_;
     const std::array<bool, 4> free_;
     std::vector<Point> points_, buried_;
     size_t at_surfaces_ = 0;                              // of points_
+    std::vector<Group> points_grouped_, buried_grouped_;
     std::vector<Weights> planes_;                         // that stopped rays
     std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane
     std::array<std::vector<std::array<int8_t, 4>>, 4> rows_;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -38,6 +38,21 @@ std::array<Plane, 4> sidesOf(const std::array<glm::vec3, 4>& corners) {
 
 bool isBeyond(const std::array<Plane, 4>& sides, auto&& beyond) {
     return std::ranges::any_of(sides, beyond);
+}
+
+// Whether a triangle may reach into the tetrahedron.
+bool reaches(const RayScene& rays, uint32_t triangle, const std::array<glm::vec3, 4>& corners,
+             const std::array<Plane, 4>& sides) {
+    const glm::vec3 a = rays.corner(triangle, 0), b = rays.corner(triangle, 1), c = rays.corner(triangle, 2);
+    if (isBeyond(sides, [&](const Plane& s) {
+            return std::min({s.distance(a), s.distance(b), s.distance(c)}) > margin_m;
+        }))
+        return false;
+    const glm::vec3 normal = rays.triangles()[triangle].normal;
+    const Plane plane{normal, glm::dot(normal, a)};
+    std::array<float, 4> off;
+    for (size_t i = 0; i < 4; ++i) off[i] = plane.distance(corners[i]);
+    return !(std::ranges::min(off) > margin_m || std::ranges::max(off) < -margin_m);
 }
 
 }  // namespace
@@ -83,6 +98,11 @@ void TriangleCells::forEachCell(uint32_t triangle, auto&& visit) const {
 
 bool TriangleCells::findNear(const std::array<glm::vec3, 4>& corners, std::vector<uint32_t>& out) const {
     out.clear();
+    // Which triangles this query has met already: most lie in several cells.
+    thread_local std::vector<uint64_t> met;
+    thread_local uint64_t query = 0;
+    if (met.size() < rays_.triangles().size()) met.resize(rays_.triangles().size(), 0);
+    ++query;
     glm::vec3 least = corners[0], most = corners[0];
     for (const glm::vec3& p : corners) least = glm::min(least, p), most = glm::max(most, p);
     const glm::ivec3 low = cellOf(least - margin_m), high = cellOf(most + margin_m);
@@ -97,21 +117,12 @@ bool TriangleCells::findNear(const std::array<glm::vec3, 4>& corners, std::vecto
                 if (first_[cell] == first_[cell + 1]) continue;
                 const glm::vec3 centre = origin_ + (glm::vec3(x, y, z) + 0.5f) * cell_m_;
                 if (isBeyond(sides, [&](const Plane& s) { return s.distance(centre) > s.reach(half); })) continue;
-                out.insert(out.end(), triangles_.begin() + first_[cell], triangles_.begin() + first_[cell + 1]);
+                for (uint32_t i = first_[cell]; i < first_[cell + 1]; ++i)
+                    if (const uint32_t t = triangles_[i];
+                        std::exchange(met[t], query) != query && reaches(rays_, t, corners, sides))
+                        out.push_back(t);
             }
     std::ranges::sort(out);
-    out.erase(std::unique(out.begin(), out.end()), out.end());
-    std::erase_if(out, [&](uint32_t t) {
-        const glm::vec3 a = rays_.corner(t, 0), b = rays_.corner(t, 1), c = rays_.corner(t, 2);
-        if (isBeyond(sides, [&](const Plane& s) {
-                return std::min({s.distance(a), s.distance(b), s.distance(c)}) > margin_m;
-            }))
-            return true;
-        const Plane plane{rays_.triangles()[t].normal, glm::dot(rays_.triangles()[t].normal, a)};
-        std::array<float, 4> off;
-        for (size_t i = 0; i < 4; ++i) off[i] = plane.distance(corners[i]);
-        return std::ranges::min(off) > margin_m || std::ranges::max(off) < -margin_m;
-    });
     return true;
 }
 
