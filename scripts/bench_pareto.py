@@ -138,7 +138,7 @@ def measure(level, configuration, truth):
            "budgets.total=0", "--set", "budgets.dynamic=0", "--cache", level.cache, *settings)
     seconds = cpu_seconds() - before
     mean, p95 = errors(pack, truth)
-    bench = json.loads(dimmer("bench", pack, "--frames", 60, "--only", "all sets changed", "--json", "-"))
+    bench = json.loads(dimmer("bench", pack, "--frames", 300, "--only", "all sets changed", "--json", "-"))
     update = bench["cases"][0]
     clock = update["process_us" if bench["clock"] == "process" else "gpu_us"]
     size = json.loads(dimmer("inspect", pack, "--json", "-"))
