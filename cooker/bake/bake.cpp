@@ -22,13 +22,15 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     const bool remembers = ends && ends->rows() == 0;
-    if (remembers) *ends = RayEnds(receivers, static_cast<uint32_t>(gatherer.receiverCount()));
+    if (remembers)
+        *ends = RayEnds(receivers, static_cast<uint32_t>(gatherer.receiverCount()), gatherer.paths().pathCount());
     const RayEnds* known = remembers ? nullptr : ends;
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
         FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
-        std::vector<uint32_t> terms, own_ends;
-        std::vector<std::vector<uint32_t>> all_ends;
+        std::vector<uint32_t> terms;
+        RowEnds own_ends;
+        std::vector<RowEnds> all_ends;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
             series.activeTerms(i, terms);
@@ -217,8 +219,10 @@ class Bake {
 
     void findRays(RememberedRays& rays) {
         const auto receivers = static_cast<uint32_t>(gatherer().receiverCount());
-        if (auto links = store_->findRays("links", {}, receivers, receivers)) rays.links = std::move(*links);
-        if (auto ends = store_->findRays("gather", {}, texels_.size(), receivers)) rays.gather = std::move(*ends);
+        const uint32_t paths = paths_.pathCount();
+        if (auto links = store_->findRays("links", {}, receivers, receivers, paths)) rays.links = std::move(*links);
+        if (auto ends = store_->findRays("gather", {}, texels_.size(), receivers, paths))
+            rays.gather = std::move(*ends);
     }
 
     void makeGrid() {

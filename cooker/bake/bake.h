@@ -154,10 +154,10 @@ class GroupStore {
     virtual std::optional<SparseLight> findRadiance(uint32_t group) = 0;
     virtual void keepRadiance(uint32_t group, const SparseLight& radiance) = 0;
 
-    // Where rays of some kind end, from so many rows, that may read so many receivers. `places`: what they start from,
-    // where that is no receiver of the level.
+    // Where rays of some kind end, from so many rows, that may read so many receivers over so many paths. `places`:
+    // what they start from, where that is no receiver of the level.
     virtual std::optional<RayEnds> findRays(std::string_view kind, std::span<const glm::vec3> places, size_t rows,
-                                            uint32_t receivers) = 0;
+                                            uint32_t receivers, uint32_t paths) = 0;
     virtual void keepRays(std::string_view kind, std::span<const glm::vec3> places, const RayEnds& ends) = 0;
 };
 

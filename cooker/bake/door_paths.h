@@ -56,6 +56,7 @@ class DoorPaths {
     explicit DoorPaths(const Scene& scene);
 
     uint32_t doorCount() const { return condition_count_ / 2; }
+    uint32_t pathCount() const { return static_cast<uint32_t>(paths_.size()); }
     // The first terms are the light groups over free paths, so that a term below groupCount() is its own group.
     const std::vector<Term>& terms() const { return terms_; }
     uint32_t termCount() const { return static_cast<uint32_t>(terms_.size()); }

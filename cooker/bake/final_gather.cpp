@@ -74,17 +74,17 @@ void FinalGather<Light>::want(uint32_t term, bool wanted) {
 }
 
 template <class Light>
-std::span<uint32_t> FinalGather<Light>::endsOfRound(std::vector<uint32_t>* ends, uint32_t round) {
-    const size_t begin = size_t{round} * rays_per_round, end = begin + rays_per_round;
-    if (!ends || end > std::max<size_t>(ends->size(), kept_rays_max)) return {};
-    if (ends->size() < end) ends->resize(end, RayEnd::unknown);
-    return std::span(*ends).subspan(begin, rays_per_round);
+RowEnds* FinalGather<Light>::endsOfRound(RowEnds* row, uint32_t round) {
+    const size_t end = (size_t{round} + 1) * rays_per_round;
+    if (!row || end > std::max<size_t>(row->ends.size(), kept_rays_max)) return nullptr;
+    if (row->ends.size() < end) row->ends.resize(end, RayEnd::unknown);
+    return row;
 }
 
 template <class Light>
 uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint32_t> terms,
                                     const SparseLight& outgoing, const FinalGatherOptions& options,
-                                    std::vector<LightOfTerm<Light>>& out, std::vector<uint32_t>* ends) {
+                                    std::vector<LightOfTerm<Light>>& out, RowEnds* ends) {
     for (uint32_t t : terms) {
         state_[t] = {};
         want(t, true);
@@ -94,14 +94,14 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
     size_t waiting = terms.size();
     uint64_t traced = 0;
     for (uint32_t r = 0; r < rounds_max && waiting > 0; ++r) {
-        const bool known = ends && ends->size() >= size_t{r + 1} * rays_per_round;
+        const bool known = ends && ends->ends.size() >= size_t{r + 1} * rays_per_round;
         gatherer_.gather(from,
                          {.rays = rays_per_round,
                           .emitter_samples = options.emitter_samples,
                           .seed = options.seed,
                           .first_ray = r * rays_per_round,
                           .wanted_in_group = wanted_in_group_,
-                          .ends = endsOfRound(ends, r)},
+                          .row = endsOfRound(ends, r)},
                          &outgoing, round_, nullptr, {aims_, aim_of_term_, wanted_in_aim_});
         const auto idle = static_cast<size_t>(std::ranges::count(wanted_in_aim_, 0u));
         traced += (known ? 0 : rays_per_round) + (aims_.size() - idle) * aimed_rays;

@@ -41,8 +41,7 @@ class FinalGather {
     // value and sample count do not depend on which other terms are asked for. `ends`, when given: of the first rays,
     // and takes those of others, up to kept_rays_max. Returns the rays traced.
     uint64_t gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
-                    const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out,
-                    std::vector<uint32_t>* ends = nullptr);
+                    const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out, RowEnds* ends = nullptr);
 
    private:
     struct State {
@@ -56,7 +55,7 @@ class FinalGather {
     };
     void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
     void want(uint32_t term, bool wanted);
-    static std::span<uint32_t> endsOfRound(std::vector<uint32_t>* ends, uint32_t round);
+    static RowEnds* endsOfRound(RowEnds* row, uint32_t round);
 
     const Gatherer& gatherer_;
     std::vector<DoorAim> aims_;

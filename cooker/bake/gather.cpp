@@ -72,6 +72,12 @@ struct Gatherer::AimShares {
     std::array<float, 16> of_aim;
 };
 
+// Of the leaves along a ray.
+struct Gatherer::LeavesMet {
+    bool any = false, shines = false;
+    std::vector<PathEnd>* through = nullptr;  // takes what the ray reads of them
+};
+
 template <class Light>
 struct Gatherer::Ray {
     using Intake = typename Light::Intake;
@@ -116,12 +122,18 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
     const uint32_t seed = hash(options.seed, from.id);
     for (uint32_t i = 0; i < options.rays + (rays_.anyLeaf() ? options.door_rays : 0); ++i) {
         const uint32_t index = options.first_ray + i;
-        const uint32_t end = i < options.ends.size() ? options.ends[i] : RayEnd::again;
-        const bool known = end < RayEnd::again;
-        if (links && i < options.rays) links->hits[i] = known && end < RayEnd::nothing ? end : no_index;
-        if (const uint32_t ahead = i + rays_ahead; outgoing && ahead < options.ends.size())
-            if (options.ends[ahead] < RayEnd::nothing) outgoing->prefetch(options.ends[ahead]);
-        if (known && !brings(end, from, outgoing, sum)) continue;
+        const bool remembered = options.row && i < options.rays && index < options.row->ends.size();
+        const uint32_t end = remembered ? options.row->ends[index] : RayEnd::again;
+        if (links && i < options.rays) links->hits[i] = end < RayEnd::through ? end : no_index;
+        if (const uint32_t ahead = index + rays_ahead; remembered && outgoing && ahead < options.row->ends.size())
+            if (options.row->ends[ahead] < RayEnd::through) outgoing->prefetch(options.row->ends[ahead]);
+        const PathEnd only{free_path, end, true};
+        std::span<const PathEnd> known;
+        if (end == RayEnd::through)
+            known = options.row->takeThrough();
+        else if (end < RayEnd::again)
+            known = {&only, 1};
+        if (!known.empty() && !brings(known, from, outgoing, sum)) continue;
         const auto point = static_cast<uint32_t>(index % from.points.size());
         const SamplePoint& origin = from.points[point];
         const TangentFrame frame = frameOf(origin);
@@ -130,12 +142,18 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         AimShares shares;
         const Ray<Light> ray{from, options, outgoing,          sum,   links, aims,  0,
                              i,    point,   origin.position_m, world, d,     shares};
-        if (known && end == RayEnd::sky)
-            takeSky(ray, free_path);
-        else if (known)
-            takeFrom(ray, end, free_path);
-        else if (const uint32_t found = follow(ray, seed + index); end == RayEnd::unknown)
-            options.ends[i] = found;
+        for (const PathEnd& p : known)
+            if (p.end == RayEnd::sky)
+                takeSky(ray, p.path);
+            else if (outgoing)
+                takeFrom(ray, p.end, p.path);
+        if (!known.empty()) continue;
+        // Links have other uses for leaves.
+        const bool remember = end == RayEnd::unknown;
+        const uint32_t found = follow(ray, seed + index, remember && !links ? &options.row->through : nullptr);
+        if (!remember) continue;
+        options.row->ends[index] = found;
+        options.row->next = options.row->through.size();
     }
     for (size_t a = 0; a < aims.all.size(); ++a)
         if (aims.wanted[a] > 0) gatherAimed(from, options, outgoing, sum, aims, a);
@@ -180,37 +198,51 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
     }
 }
 
-// Whether a ray with a known end can bring anything that is wanted.
+// Whether a ray with known ends can bring anything that is wanted.
 template <class Light>
-bool Gatherer::brings(uint32_t end, const GatherFrom& from, const SparseLight* outgoing,
+bool Gatherer::brings(std::span<const PathEnd> ends, const GatherFrom& from, const SparseLight* outgoing,
                       const TermAccumulator<Light>& sum) const {
-    if (end == RayEnd::nothing) return false;
-    if (end == RayEnd::sky) {
-        const uint32_t term = paths_.term(always_group, free_path);
-        return term != no_term && sum.wants(term);
-    }
-    if (!outgoing || !outgoing->any(end)) return false;
-    const auto light = outgoing->row(end);
-    if (from.condition != no_condition) return true;
-    return std::ranges::any_of(light, [&](const TermLight& l) { return sum.wants(l.term); });
+    return std::ranges::any_of(ends, [&](const PathEnd& p) {
+        if (p.end == RayEnd::nothing) return false;
+        if (p.end == RayEnd::sky) {
+            const uint32_t term = paths_.term(always_group, p.path);
+            return term != no_term && sum.wants(term);
+        }
+        if (!outgoing || !outgoing->any(p.end)) return false;
+        if (from.condition != no_condition || p.path != free_path) return true;
+        return std::ranges::any_of(outgoing->row(p.end), [&](const TermLight& l) { return sum.wants(l.term); });
+    });
 }
 
-// Traces a ray and takes what it finds. Returns where it ended.
+// Traces a ray and takes what it finds. Returns where it ended; `through`, when given, takes what it reads where it met
+// leaves: else such a ray ends nowhere that could be told.
 template <class Light>
-uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed) const {
+uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed, std::vector<PathEnd>* through) const {
     if (ray.forDoors() && rays_.leavesAlong(ray.origin, ray.world, far_away_m).count == 0) return RayEnd::again;
     const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored);
-    bool any_leaf = false;
-    const uint32_t path =
-        rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m, any_leaf) : free_path;
-    if (path == no_path || (path == free_path && ray.forDoors())) return RayEnd::again;
-    if (!hit) {
+    const size_t first = through ? through->size() : 0;
+    LeavesMet met{.through = through};
+    const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m, met) : free_path;
+    uint32_t end = RayEnd::nothing;
+    bool shines = met.shines;
+    if (path == no_path || (path == free_path && ray.forDoors())) {
+        // Stopped by a leaf, or not for this ray.
+    } else if (!hit) {
         takeSky(ray, path);
-        return any_leaf ? RayEnd::again : RayEnd::sky;
+        end = RayEnd::sky;
+    } else {
+        if (const uint32_t found = take(ray, *hit, path); found != no_index) end = found;
+        shines = shines || emitters_.emitterOf(hit->triangle);
     }
-    const uint32_t found = take(ray, *hit, path);
-    if (any_leaf || emitters_.emitterOf(hit->triangle)) return RayEnd::again;
-    return found == no_index ? RayEnd::nothing : found;
+    if (shines || (met.any && !through)) {
+        if (through) through->resize(first);
+        return RayEnd::again;
+    }
+    if (!met.any) return end;
+    if (end != RayEnd::nothing) through->push_back({path, end});
+    if (through->size() == first) return RayEnd::nothing;
+    through->back().last = true;
+    return RayEnd::through;
 }
 
 // From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
@@ -247,10 +279,15 @@ void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
 // Takes what the leaves along a ray send back, and says whether there are any. Returns the path on which it goes on
 // behind them.
 template <class Light>
-uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m, bool& any) const {
+uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m, LeavesMet& met) const {
     uint32_t path = free_path;
+    const auto takeLeaf = [&](const Hit& hit, uint32_t over) {
+        const uint32_t found = take(ray, hit, over);
+        met.shines = met.shines || emitters_.emitterOf(hit.triangle);
+        if (met.through && found != no_index) met.through->push_back({over, found});
+    };
     for (const Hit& hit : rays_.leavesAlong(ray.origin, ray.world, distance_m)) {
-        any = true;
+        met.any = true;
         const uint32_t condition = rays_.triangles()[hit.triangle].condition;
         const Leaf leaf = paths_.leaf(path, ray.from.condition, condition);
         if (leaf == Leaf::Absent) continue;
@@ -259,10 +296,10 @@ uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m, bool& 
         if (stopped < 1 && unitFloat(hash(chance, hit.triangle)) >= stopped) continue;
         if (ray.links && !ray.forDoors()) ray.links->doors.push_back(condition / 2);
         if (leaf == Leaf::There) {
-            if (path != free_path || !ray.forDoors()) take(ray, hit, path);
+            if (path != free_path || !ray.forDoors()) takeLeaf(hit, path);
             return no_path;
         }
-        if (const uint32_t reflecting = paths_.with(path, condition); reflecting != no_path) take(ray, hit, reflecting);
+        if (const uint32_t reflecting = paths_.with(path, condition); reflecting != no_path) takeLeaf(hit, reflecting);
         path = paths_.with(path, condition ^ 1);
         if (path == no_path) return no_path;
     }

@@ -101,9 +101,9 @@ struct GatherOptions {
     // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
     // all are.
     std::span<const uint32_t> wanted_in_group;
-    // Per ray, where it ends (RayEnd): known ones are not traced, unknown ones become known. Empty: none is remembered.
-    // With emitters where others are they are not the same.
-    std::span<uint32_t> ends = {};
+    // Where the receiver's rays end, counted like first_ray: known ones are not traced, unknown ones become known.
+    // Null: none is remembered. With emitters where others are they are not the same.
+    RowEnds* row = nullptr;
 
     uint32_t raysOver(uint32_t path) const { return path == free_path ? rays : rays + door_rays; }
 };
@@ -217,21 +217,22 @@ class Gatherer {
 
    private:
     struct AimShares;
+    struct LeavesMet;
     template <class Light>
     struct Ray;
     template <class Light>
-    uint32_t throughLeaves(const Ray<Light>& ray, float distance_m, bool& any) const;
+    uint32_t throughLeaves(const Ray<Light>& ray, float distance_m, LeavesMet& met) const;
     template <class Light>
     uint32_t take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const;
     template <class Light>
     void takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path) const;
     template <class Light>
-    bool brings(uint32_t end, const GatherFrom& from, const SparseLight* outgoing,
+    bool brings(std::span<const PathEnd> ends, const GatherFrom& from, const SparseLight* outgoing,
                 const TermAccumulator<Light>& sum) const;
     template <class Light>
     void takeSky(const Ray<Light>& ray, uint32_t path) const;
     template <class Light>
-    uint32_t follow(const Ray<Light>& ray, uint32_t seed) const;
+    uint32_t follow(const Ray<Light>& ray, uint32_t seed, std::vector<PathEnd>* through = nullptr) const;
     template <class Light>
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                      TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim) const;

@@ -19,66 +19,97 @@ size_t wordsFor(size_t count, uint32_t bits) {
 
 }  // namespace
 
-RayEnds::RayEnds(size_t rows, uint32_t receivers)
+RayEnds::RayEnds(size_t rows, uint32_t receivers, uint32_t paths)
     : rows_(rows),
       receivers_(receivers),
-      bits_(static_cast<uint32_t>(std::bit_width(receivers + RayEnd::kinds - 1))),
+      paths_(paths),
+      bits_(static_cast<uint32_t>(std::bit_width(std::max(receivers + RayEnd::kinds, 2 * paths) - 1))),
       blocks_(blockCount(rows)) {}
 
-void RayEnds::get(size_t row, std::vector<uint32_t>& out) const {
+void RayEnds::get(size_t row, RowEnds& out) const {
     out.clear();
     const Block& block = blocks_[row / rows_per_block];
-    if (block.first.empty()) return;
-    const uint32_t first = block.first[row % rows_per_block], last = block.first[row % rows_per_block + 1];
+    unpack(block.ends, row % rows_per_block, out.ends);
+    for (uint32_t& value : out.ends) value = end(value);
+    thread_local std::vector<uint32_t> numbers;
+    unpack(block.through, row % rows_per_block, numbers);
+    for (size_t i = 0; i + 1 < numbers.size(); i += 2) {
+        const PathEnd p{numbers[i] / 2, end(numbers[i + 1]), numbers[i] % 2 != 0};
+        if (p.path >= paths_ || (p.end >= receivers_ && p.end != RayEnd::sky)) return out.through.clear();
+        out.through.push_back(p);
+    }
+}
+
+void RayEnds::putBlock(size_t b, std::span<const RowEnds> rows) {
+    std::vector<uint32_t> ends, through;
+    blocks_[b] = {{{0}, {}}, {{0}, {}}};
+    for (const RowEnds& row : rows) {
+        for (const uint32_t value : row.ends) ends.push_back(code(value));
+        for (const PathEnd& p : row.through) {
+            through.push_back(2 * p.path + p.last);
+            through.push_back(code(p.end));
+        }
+        blocks_[b].ends.first.push_back(static_cast<uint32_t>(ends.size()));
+        blocks_[b].through.first.push_back(static_cast<uint32_t>(through.size()));
+    }
+    blocks_[b].ends.words = packed(ends);
+    blocks_[b].through.words = packed(through);
+}
+
+std::vector<uint32_t> RayEnds::packed(std::span<const uint32_t> numbers) const {
+    std::vector<uint32_t> words(wordsFor(numbers.size(), bits_), 0);
+    uint64_t bit = 0;
+    for (const uint32_t number : numbers) {
+        uint64_t pair;
+        std::memcpy(&pair, &words[bit / word_bits], sizeof pair);
+        pair |= uint64_t{number} << (bit % word_bits);
+        std::memcpy(&words[bit / word_bits], &pair, sizeof pair);
+        bit += bits_;
+    }
+    return words;
+}
+
+void RayEnds::unpack(const Packed& packed, size_t row, std::vector<uint32_t>& out) const {
+    out.clear();
+    if (packed.first.empty()) return;
+    const uint32_t first = packed.first[row], last = packed.first[row + 1];
     out.resize(last - first);
     const uint64_t mask = (uint64_t{1} << bits_) - 1;
     uint64_t bit = uint64_t{first} * bits_;
-    for (uint32_t& value : out) {
+    for (uint32_t& number : out) {
         uint64_t pair;
-        std::memcpy(&pair, &block.words[bit / word_bits], sizeof pair);
-        value = end(static_cast<uint32_t>(pair >> (bit % word_bits) & mask));
+        std::memcpy(&pair, &packed.words[bit / word_bits], sizeof pair);
+        number = static_cast<uint32_t>(pair >> (bit % word_bits) & mask);
         bit += bits_;
     }
 }
 
-void RayEnds::putBlock(size_t b, std::span<const std::vector<uint32_t>> rows) {
-    Block& block = blocks_[b];
-    block.first = {0};
-    for (const auto& row : rows) block.first.push_back(block.first.back() + static_cast<uint32_t>(row.size()));
-    block.words.assign(wordsFor(block.first.back(), bits_), 0);
-    uint64_t bit = 0;
-    for (const auto& row : rows)
-        for (const uint32_t value : row) {
-            uint64_t pair;
-            std::memcpy(&pair, &block.words[bit / word_bits], sizeof pair);
-            pair |= uint64_t{code(value)} << (bit % word_bits);
-            std::memcpy(&block.words[bit / word_bits], &pair, sizeof pair);
-            bit += bits_;
-        }
-}
-
 std::vector<std::byte> RayEnds::toBytes() const {
     format::ByteWriter out;
-    for (const Block& block : blocks_) {
-        out.putArray(std::span<const uint32_t>(block.first));
-        out.putArray(std::span<const uint32_t>(block.words));
-    }
+    for (const Block& block : blocks_)
+        for (const Packed* packed : {&block.ends, &block.through}) {
+            out.putArray(std::span<const uint32_t>(packed->first));
+            out.putArray(std::span<const uint32_t>(packed->words));
+        }
     return out.take();
 }
 
-std::optional<RayEnds> RayEnds::fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers) {
+bool RayEnds::areOf(const Packed& packed, size_t rows) const {
+    if (packed.first.empty()) return packed.words.empty();
+    return packed.first.size() == rows + 1 && packed.first[0] == 0 && std::ranges::is_sorted(packed.first) &&
+           packed.words.size() == wordsFor(packed.first.back(), bits_);
+}
+
+std::optional<RayEnds> RayEnds::fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers,
+                                          uint32_t paths) {
     format::ByteReader in(bytes);
-    RayEnds ends(rows, receivers);
-    for (size_t b = 0; b < ends.blocks_.size(); ++b) {
-        Block& block = ends.blocks_[b];
-        block.first = in.getArray<uint32_t>();
-        block.words = in.getArray<uint32_t>();
-        if (block.first.empty() && block.words.empty()) continue;
-        const size_t in_block = std::min(rows - b * rows_per_block, rows_per_block);
-        if (!in.ok() || block.first.size() != in_block + 1 || block.first[0] != 0 ||
-            !std::ranges::is_sorted(block.first) || block.words.size() != wordsFor(block.first.back(), ends.bits_))
-            return {};
-    }
+    RayEnds ends(rows, receivers, paths);
+    for (size_t b = 0; b < ends.blocks_.size(); ++b)
+        for (Packed* packed : {&ends.blocks_[b].ends, &ends.blocks_[b].through}) {
+            packed->first = in.getArray<uint32_t>();
+            packed->words = in.getArray<uint32_t>();
+            if (!in.ok() || !ends.areOf(*packed, std::min(rows - b * rows_per_block, rows_per_block))) return {};
+        }
     return in.atEnd() ? std::optional(std::move(ends)) : std::nullopt;
 }
 

@@ -12,36 +12,72 @@ namespace dimmer::cook {
 // The end of one ray: the receiver that it reads, or one of these.
 struct RayEnd {
     static constexpr uint32_t unknown = UINT32_MAX;      // not traced yet
-    static constexpr uint32_t again = UINT32_MAX - 1;    // it met a leaf or an emitter: to be traced each time
+    static constexpr uint32_t again = UINT32_MAX - 1;    // it met an emitter, say: to be traced each time
     static constexpr uint32_t sky = UINT32_MAX - 2;      // it met nothing
     static constexpr uint32_t nothing = UINT32_MAX - 3;  // it met what sends no light back
-    static constexpr uint32_t kinds = 3;                 // of known ends that are no receivers
+    static constexpr uint32_t through = UINT32_MAX - 4;  // it met leaves of doors: RowEnds::through has what it reads
+    static constexpr uint32_t kinds = 4;                 // of known ends that are no receivers
+};
+
+// What a ray reads over one path (DoorPaths): a receiver, or RayEnd::sky.
+struct PathEnd {
+    uint32_t path = 0, end = 0;
+    bool last = false;  // of its ray
+    bool operator==(const PathEnd&) const = default;
+};
+
+// The ends of one row's rays, in their order.
+struct RowEnds {
+    std::vector<uint32_t> ends;    // per ray
+    std::vector<PathEnd> through;  // of all rays that are RayEnd::through, one after another
+    size_t next = 0;               // in `through`: of the next such ray
+
+    void clear() {
+        ends.clear();
+        through.clear();
+        next = 0;
+    }
+    // What the next ray that went through leaves reads. Empty: it is not known.
+    std::span<const PathEnd> takeThrough() {
+        const size_t begin = next;
+        while (next < through.size() && !through[next++].last) continue;
+        return std::span(through).subspan(begin, next - begin);
+    }
 };
 
 // The ends of the first rays of each of many rows (receivers, or places), in as many bits as their numbers need.
 class RayEnds {
    public:
     RayEnds() = default;
-    // `receivers`: that rays may read.
-    RayEnds(size_t rows, uint32_t receivers);
+    // `receivers`: that rays may read; `paths`: over which.
+    RayEnds(size_t rows, uint32_t receivers, uint32_t paths);
 
     // 0: nothing is remembered.
     size_t rows() const { return rows_; }
     // Replaces `out`. Thread-safe.
-    void get(size_t row, std::vector<uint32_t>& out) const;
+    void get(size_t row, RowEnds& out) const;
     // Those of a block of rows (sparse_light.h) at once, none of them unknown; other blocks may be put at the same
     // time.
-    void putBlock(size_t block, std::span<const std::vector<uint32_t>> rows);
+    void putBlock(size_t block, std::span<const RowEnds> rows);
 
     std::vector<std::byte> toBytes() const;
     // Nothing where they are not ends of so many rows.
-    static std::optional<RayEnds> fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers);
+    static std::optional<RayEnds> fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers,
+                                            uint32_t paths);
 
    private:
-    struct Block {
-        std::vector<uint32_t> first;  // per row and one more, in ends
+    // Numbers of `bits_` bits.
+    struct Packed {
+        std::vector<uint32_t> first;  // per row and one more
         std::vector<uint32_t> words;
     };
+    // Ends; and of PathEnds two numbers each: the path and `last`, and the end.
+    struct Block {
+        Packed ends, through;
+    };
+    std::vector<uint32_t> packed(std::span<const uint32_t> numbers) const;
+    void unpack(const Packed& packed, size_t row, std::vector<uint32_t>& out) const;
+    bool areOf(const Packed& packed, size_t rows) const;
     uint32_t code(uint32_t end) const { return end < receivers_ ? end : receivers_ + (RayEnd::again - end); }
     // What is none of them is traced again.
     uint32_t end(uint32_t code) const {
@@ -50,7 +86,7 @@ class RayEnds {
     }
 
     size_t rows_ = 0;
-    uint32_t receivers_ = 0, bits_ = 0;
+    uint32_t receivers_ = 0, paths_ = 0, bits_ = 0;
     std::vector<Block> blocks_;
 };
 

@@ -84,7 +84,7 @@ class Expansion {
         progress_.stage("direct light and links", receivers_);
         links_.assign(receivers_ * settings_.series_rays, no_index);
         const bool remembers = ends_ && ends_->rows() == 0;
-        if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_));
+        if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_), gatherer_.paths().pathCount());
         const RayEnds* known = remembers ? nullptr : ends_;
         GatherOptions options;
         options.rays = settings_.series_rays;
@@ -102,14 +102,14 @@ class Expansion {
             std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
             GatherLinks links;
-            std::vector<uint32_t> ends;
-            std::vector<std::vector<uint32_t>> all_ends;
+            RowEnds ends;
+            std::vector<RowEnds> all_ends;
             GatherOptions own_options = options;
             uint64_t traced = 0;
             for (size_t i = begin; i < end; ++i) {
-                ends.assign(ends_ ? options.rays : 0, RayEnd::unknown);
+                ends.ends.assign(ends_ ? options.rays : 0, RayEnd::unknown);
                 if (known) known->get(i, ends);
-                own_options.ends = ends.size() < options.rays ? std::span<uint32_t>{} : std::span(ends);
+                own_options.row = ends.ends.size() < options.rays ? nullptr : &ends;
                 traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {

@@ -140,8 +140,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
     });
     const auto counts = fillTables<TexelRecord>(
-        grouping, pack.contributions.size(),
-        {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
+        grouping, pack.contributions.size(), {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
         [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });

@@ -189,9 +189,8 @@ void CookCache::keepSites(const Key& group, std::span<const SiteBlock> blocks,
                           std::span<const Sparse<ProbeTermLight>> light, std::span<const size_t> fresh) {
     std::vector<Expected<void>> kept(fresh.size());
     const auto keyOf = [&](size_t i) { return sitesKey(group, blocks[fresh[i]]); };
-    tbb::parallel_for(size_t{0}, fresh.size(), [&](size_t i) {
-        kept[i] = store_.keep(sites_kind, keyOf(i), cook::toBytes(light[fresh[i]]));
-    });
+    tbb::parallel_for(size_t{0}, fresh.size(),
+                      [&](size_t i) { kept[i] = store_.keep(sites_kind, keyOf(i), cook::toBytes(light[fresh[i]])); });
     for (size_t i = 0; i < fresh.size(); ++i) note(CacheStore::nameOf(sites_kind, keyOf(i)), kept[i]);
 }
 
@@ -218,9 +217,9 @@ void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
     keep(radiance_kind, key, cook::toBytes(radiance));
 }
 
-std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers) {
+std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers, uint32_t paths) {
     const Entry entry = look(rays_kind, key);
-    return entry.find == Find::Hit ? RayEnds::fromBytes(entry.bytes, rows, receivers) : std::nullopt;
+    return entry.find == Find::Hit ? RayEnds::fromBytes(entry.bytes, rows, receivers, paths) : std::nullopt;
 }
 
 void CookCache::keepRays(const Key& key, const RayEnds& ends) {

@@ -55,7 +55,7 @@ class CookCache {
     std::optional<SparseLight> findRadiance(const Key& key);
     void keepRadiance(const Key& key, const SparseLight& radiance);
     // Where rays end.
-    std::optional<RayEnds> findRays(const Key& key, size_t rows, uint32_t receivers);
+    std::optional<RayEnds> findRays(const Key& key, size_t rows, uint32_t receivers, uint32_t paths);
     void keepRays(const Key& key, const RayEnds& ends);
 
     // Ends the cook: removes old entries, and remembers what this one depended on.
@@ -107,8 +107,8 @@ class CachedGroups final : public GroupStore {
         cache_.keepRadiance(keys_[group], radiance);
     }
     std::optional<RayEnds> findRays(std::string_view kind, std::span<const glm::vec3> places, size_t rows,
-                                    uint32_t receivers) override {
-        return cache_.findRays(raysKey(rays_, kind, places), rows, receivers);
+                                    uint32_t receivers, uint32_t paths) override {
+        return cache_.findRays(raysKey(rays_, kind, places), rows, receivers, paths);
     }
     void keepRays(std::string_view kind, std::span<const glm::vec3> places, const RayEnds& ends) override {
         cache_.keepRays(raysKey(rays_, kind, places), ends);

@@ -34,7 +34,6 @@ constexpr uint32_t rarity_seed = 0x2c1b3c6du;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
 constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
-constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
 // Of a light set, beside always-on light: sets are off at times.
 constexpr float weight_of_sets = 0.05f;
@@ -191,21 +190,21 @@ class PlaceTrace {
         }
     }
 
-    // Adds what is active there, ascending. `ends`: of the rays, as GatherOptions has them. Returns the rays traced.
-    uint64_t trace(glm::vec3 place, uint32_t rays, std::span<uint32_t> ends, std::vector<ProbeTermLight>& row) {
+    // Adds what is active there, ascending. `ends`: of the rays, as GatherOptions::row. Returns the rays traced.
+    uint64_t trace(glm::vec3 place, uint32_t rays, RowEnds* ends, std::vector<ProbeTermLight>& row) {
         const SamplePoint point{place, no_face};
         // A place has noise of its own wherever it stands in whatever list.
         uint32_t seed = site_seed;
         for (int c = 0; c < 3; ++c) seed = hash(seed, std::bit_cast<uint32_t>(place[c]));
         const GatherFrom from = Gatherer::atProbe(point, seed);
         const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, sum_);
-        const bool known = !ends.empty() && ends[0] != RayEnd::unknown;
+        const bool known = ends && ends->ends[0] != RayEnd::unknown;
         gatherer_.gather(from,
                          {.rays = rays,
                           .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
                           .seed = settings_.seed + 2,
                           .wanted_in_group = wanted_in_group_,
-                          .ends = ends},
+                          .row = ends},
                          &radiance_, sum_, nullptr);
         if (sum_.wants(always_group)) sum_[always_group];  // every site has some
         for (const uint32_t t : direct_.touched())
@@ -247,43 +246,42 @@ SparseLight ofGroups(const SparseLight& light, std::span<const Term> terms, std:
 // Where the rays of blocks of places end: what a store knows, and what it is to know.
 class SiteRays {
    public:
-    SiteRays(std::span<const SiteBlock> all, std::span<const size_t> blocks, GroupStore* store, uint32_t receivers)
-        : all_(all), store_(store), receivers_(receivers), known_(all.size()), fresh_(all.size()) {
+    SiteRays(std::span<const SiteBlock> all, std::span<const size_t> blocks, GroupStore* store, uint32_t receivers,
+             uint32_t paths)
+        : all_(all), store_(store), known_(all.size()), fresh_(all.size()) {
         for (const size_t b : blocks) {
+            const size_t places = all[b].places_m.size();
             if (!store) break;
-            if (auto found = store->findRays("places", all[b].places_m, all[b].places_m.size(), receivers))
+            if (auto found = store->findRays("places", all[b].places_m, places, receivers, paths))
                 known_[b] = std::move(*found);
             else
-                fresh_[b].resize(all[b].places_m.size());
+                fresh_[b] = RayEnds(places, receivers, paths);
         }
     }
-    // Replaces `ends`. As take(), for different places at the same time.
-    void get(size_t block, size_t place, std::vector<uint32_t>& ends) const {
-        ends.clear();
-        if (known_[block].rows() > 0) known_[block].get(place, ends);
-        if (store_ && ends.size() != all_[block].rays) ends.assign(all_[block].rays, RayEnd::unknown);
+    // Of some places of a block in a row, as putBlock() takes them. Empty: none are to be remembered. As take(), for
+    // different places at the same time.
+    void get(size_t block, size_t begin, size_t end, std::vector<RowEnds>& rows) const {
+        rows.resize(store_ ? end - begin : 0);
+        for (size_t i = 0; i < rows.size(); ++i) {
+            rows[i].clear();
+            if (known_[block].rows() > 0) known_[block].get(begin + i, rows[i]);
+            if (rows[i].ends.size() == all_[block].rays) continue;
+            rows[i].clear();
+            rows[i].ends.assign(all_[block].rays, RayEnd::unknown);
+        }
     }
-    void take(size_t block, size_t place, const std::vector<uint32_t>& ends) {
-        if (!fresh_[block].empty()) fresh_[block][place] = ends;
+    void take(size_t block, size_t begin, std::span<const RowEnds> rows) {
+        if (fresh_[block].rows() > 0) fresh_[block].putBlock(begin / rows_per_block, rows);
     }
     void keep() {
-        for (size_t b = 0; b < all_.size(); ++b) {
-            if (fresh_[b].empty()) continue;
-            RayEnds ends(fresh_[b].size(), receivers_);
-            for (size_t i = 0; i < blockCount(fresh_[b].size()); ++i) {
-                const size_t begin = i * rows_per_block, end = std::min(begin + rows_per_block, fresh_[b].size());
-                ends.putBlock(i, std::span(fresh_[b]).subspan(begin, end - begin));
-            }
-            store_->keepRays("places", all_[b].places_m, ends);
-        }
+        for (size_t b = 0; b < all_.size(); ++b)
+            if (fresh_[b].rows() > 0) store_->keepRays("places", all_[b].places_m, fresh_[b]);
     }
 
    private:
     std::span<const SiteBlock> all_;
     GroupStore* store_;
-    uint32_t receivers_;
-    std::vector<RayEnds> known_;                             // per block
-    std::vector<std::vector<std::vector<uint32_t>>> fresh_;  // per block and place
+    std::vector<RayEnds> known_, fresh_;  // per block
 };
 
 // Of each group over the rows that count: light that it sends, and how many it reaches.
@@ -396,24 +394,33 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
     for (const auto& [groups, blocks] : passes) {
         std::vector<uint8_t> wanted(light_.size());
         for (const uint32_t g : groups) wanted[g] = 1;
-        std::vector<std::pair<size_t, size_t>> places;  // block and row
+        struct Part {
+            size_t block, begin, end;  // of its places
+            size_t first;              // of all
+        };
+        std::vector<Part> parts;
+        size_t places = 0;
         for (const size_t b : blocks)
-            for (size_t i = 0; i < blocks_[b].places_m.size(); ++i) places.emplace_back(b, i);
+            for (size_t begin = 0, count = blocks_[b].places_m.size(); begin < count; begin += rows_per_block) {
+                const size_t end = std::min(begin + rows_per_block, count);
+                parts.push_back({b, begin, end, places});
+                places += end - begin;
+            }
         const bool all = std::ranges::count(wanted, 0) == 0;
         const SparseLight some = all ? SparseLight() : ofGroups(radiance, paths_.terms(), wanted);
-        SiteRays rays(blocks_, blocks, store_, static_cast<uint32_t>(gatherer.receiverCount()));
-        progress.stage("light at probe sites", places.size());
-        std::vector<Row> rows(places.size());
-        tbb::parallel_for(tbb::blocked_range<size_t>(0, places.size(), sites_per_task), [&](const auto& range) {
+        SiteRays rays(blocks_, blocks, store_, static_cast<uint32_t>(gatherer.receiverCount()), paths_.pathCount());
+        progress.stage("light at probe sites", places);
+        std::vector<Row> rows(places);
+        tbb::parallel_for(size_t{0}, parts.size(), [&](size_t p) {
+            const auto& [b, begin, end, first] = parts[p];
             PlaceTrace trace(gatherer, lights, all ? radiance : some, reports, settings, wanted);
-            std::vector<uint32_t> ends;
-            for (size_t i = range.begin(); i < range.end(); ++i) {
-                const auto [b, k] = places[i];
-                rays.get(b, k, ends);
-                traced += trace.trace(blocks_[b].places_m[k], blocks_[b].rays, ends, rows[i]);
-                rays.take(b, k, ends);
-            }
-            progress.advance(range.size());
+            std::vector<RowEnds> ends;
+            rays.get(b, begin, end, ends);
+            for (size_t i = 0; i < end - begin; ++i)
+                traced += trace.trace(blocks_[b].places_m[begin + i], blocks_[b].rays,
+                                      ends.empty() ? nullptr : &ends[i], rows[first + i]);
+            rays.take(b, begin, ends);
+            progress.advance(end - begin);
         });
         rays.keep();
         share(rows, blocks, groups);

@@ -265,7 +265,7 @@ class Table {
     const Obstacles& obstacles_;
     const std::array<bool, 4> free_;
     std::vector<Point> points_, buried_;
-    size_t at_surfaces_ = 0;                              // of points_
+    size_t at_surfaces_ = 0;  // of points_
     std::vector<Group> points_grouped_, buried_grouped_;
     std::vector<Weights> planes_;                         // that stopped rays
     std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane

@@ -7,18 +7,26 @@
 namespace dimmer::cook {
 namespace {
 
-std::vector<std::vector<uint32_t>> someEnds(size_t rows, uint32_t receivers) {
-    std::vector<std::vector<uint32_t>> all(rows);
+constexpr uint32_t paths = 7;
+
+std::vector<RowEnds> someEnds(size_t rows, uint32_t receivers) {
+    std::vector<RowEnds> all(rows);
     for (uint32_t i = 0; i < rows; ++i)
         for (uint32_t k = 0; k < hash(i) % 70; ++k) {
             const uint32_t draw = hash(i, k) % (receivers + RayEnd::kinds);
-            all[i].push_back(draw < receivers ? draw : RayEnd::again - (draw - receivers));
+            all[i].ends.push_back(draw < receivers ? draw : RayEnd::again - (draw - receivers));
+            if (all[i].ends.back() != RayEnd::through) continue;
+            const uint32_t count = 1 + hash(i, k + 100) % 3;
+            for (uint32_t n = 0; n < count; ++n)
+                all[i].through.push_back({hash(i, n) % paths,
+                                          hash(k, n) % 5 == 0 ? RayEnd::sky : hash(hash(i, k), n) % receivers,
+                                          n + 1 == count});
         }
     return all;
 }
 
-RayEnds ends(const std::vector<std::vector<uint32_t>>& rows, uint32_t receivers) {
-    RayEnds out(rows.size(), receivers);
+RayEnds ends(const std::vector<RowEnds>& rows, uint32_t receivers) {
+    RayEnds out(rows.size(), receivers, paths);
     for (size_t b = 0; b < blockCount(rows.size()); ++b) {
         const size_t begin = b * rows_per_block;
         out.putBlock(b, std::span(rows).subspan(begin, std::min(rows_per_block, rows.size() - begin)));
@@ -30,15 +38,15 @@ TEST(RayEnds, ComeBackAsTheyWere) {
     for (const uint32_t receivers : {1u, 5u, 1000u, 65533u, 65534u, 1u << 24}) {
         const auto rows = someEnds(600, receivers);
         const RayEnds put = ends(rows, receivers);
-        const auto read = RayEnds::fromBytes(put.toBytes(), rows.size(), receivers);
+        const auto read = RayEnds::fromBytes(put.toBytes(), rows.size(), receivers, paths);
         ASSERT_TRUE(read.has_value());
-        std::vector<uint32_t> row;
-        for (size_t i = 0; i < rows.size(); ++i) {
-            put.get(i, row);
-            EXPECT_EQ(row, rows[i]);
-            read->get(i, row);
-            EXPECT_EQ(row, rows[i]);
-        }
+        RowEnds row;
+        for (size_t i = 0; i < rows.size(); ++i)
+            for (const RayEnds* from : {&put, &*read}) {
+                from->get(i, row);
+                EXPECT_EQ(row.ends, rows[i].ends);
+                EXPECT_EQ(row.through, rows[i].through);
+            }
     }
 }
 
@@ -46,17 +54,17 @@ TEST(RayEnds, ArePackedTightly) {
     const uint32_t receivers = 65000;  // 16 bits
     const auto rows = someEnds(2560, receivers);
     size_t count = 0;
-    for (const auto& row : rows) count += row.size();
-    // Two bytes each, four to say where a row begins, and some 16 for each block of 256 rows.
-    EXPECT_LE(ends(rows, receivers).toBytes().size(), 2 * count + 4 * rows.size() + 16 * 10 + 64);
+    for (const auto& row : rows) count += row.ends.size() + 2 * row.through.size();
+    // Two bytes each, twice four to say where a row begins, and some 32 for each block of 256 rows.
+    EXPECT_LE(ends(rows, receivers).toBytes().size(), 2 * count + 8 * rows.size() + 32 * 10 + 128);
 }
 
 TEST(RayEnds, OfAnotherLevelAreRefused) {
     const auto bytes = ends(someEnds(600, 1000), 1000).toBytes();
-    EXPECT_FALSE(RayEnds::fromBytes(bytes, 900, 1000).has_value());
-    EXPECT_FALSE(RayEnds::fromBytes(bytes, 300, 1000).has_value());
-    EXPECT_FALSE(RayEnds::fromBytes(bytes, 600, 70000).has_value());  // of more bits
-    EXPECT_FALSE(RayEnds::fromBytes(std::span(bytes).first(bytes.size() - 5), 600, 1000).has_value());
+    EXPECT_FALSE(RayEnds::fromBytes(bytes, 900, 1000, paths).has_value());
+    EXPECT_FALSE(RayEnds::fromBytes(bytes, 300, 1000, paths).has_value());
+    EXPECT_FALSE(RayEnds::fromBytes(bytes, 600, 70000, paths).has_value());  // of more bits
+    EXPECT_FALSE(RayEnds::fromBytes(std::span(bytes).first(bytes.size() - 5), 600, 1000, paths).has_value());
 }
 
 TEST(RayEnds, OfDamagedBytesAreReceiversThatAreThere) {
@@ -67,13 +75,18 @@ TEST(RayEnds, OfDamagedBytesAreReceiversThatAreThere) {
         auto damaged = bytes;
         for (uint32_t k = 0; k < 20; ++k)
             damaged[hash(i, 2 * k) % damaged.size()] = static_cast<std::byte>(hash(i, 2 * k + 1));
-        const auto found = RayEnds::fromBytes(damaged, 600, receivers);
+        const auto found = RayEnds::fromBytes(damaged, 600, receivers, paths);
         if (!found) continue;
         ++read;
-        std::vector<uint32_t> row;
+        RowEnds row;
         for (size_t r = 0; r < 600; ++r) {
             found->get(r, row);
-            for (const uint32_t end : row) strange += end >= receivers && end < RayEnd::nothing;
+            for (const uint32_t end : row.ends) {
+                strange += end >= receivers && end < RayEnd::through;
+                if (end != RayEnd::through) continue;
+                for (const PathEnd& p : row.takeThrough())
+                    strange += p.path >= paths || (p.end >= receivers && p.end != RayEnd::sky);
+            }
         }
     }
     EXPECT_GT(read, 10u);
