@@ -117,7 +117,6 @@ struct Baked {
 struct SiteBlock {
     std::vector<glm::vec3> places_m;
     uint32_t rays = 0;  // from each place
-    bool operator==(const SiteBlock&) const = default;
 };
 
 // All that a bake finds out about one light group. It depends on that group, the level's geometry and the settings

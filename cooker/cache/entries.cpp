@@ -142,13 +142,6 @@ std::optional<Sparse<Entry>> getRows(ByteReader& in) {
     return rows.finish();
 }
 
-template <class Entry>
-std::optional<Sparse<Entry>> rowsFromBytes(std::span<const std::byte> bytes) {
-    ByteReader in(bytes);
-    auto light = getRows<Entry>(in);
-    return light && in.atEnd() ? std::move(light) : std::nullopt;
-}
-
 void visitGrid(auto& grid, auto&& visit) {
     visit(grid.positions);
     visit(grid.levels);
@@ -245,14 +238,21 @@ std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
     return baked;
 }
 
-std::vector<std::byte> toBytes(const Sparse<ProbeTermLight>& light) {
+std::vector<std::byte> toBytes(std::span<const Sparse<ProbeTermLight>> light) {
     ByteWriter out;
-    putRows(out, light);
+    for (const auto& of_block : light) putRows(out, of_block);
     return out.take();
 }
 
-std::optional<Sparse<ProbeTermLight>> probeLightFromBytes(std::span<const std::byte> bytes) {
-    return rowsFromBytes<ProbeTermLight>(bytes);
+std::optional<std::vector<Sparse<ProbeTermLight>>> siteLightFromBytes(std::span<const std::byte> bytes, size_t blocks) {
+    ByteReader in(bytes);
+    std::vector<Sparse<ProbeTermLight>> light;
+    while (light.size() < blocks) {
+        auto of_block = getRows<ProbeTermLight>(in);
+        if (!of_block) return {};
+        light.push_back(std::move(*of_block));
+    }
+    return in.atEnd() ? std::optional(std::move(light)) : std::nullopt;
 }
 
 std::vector<std::byte> toBytes(const SparseLight& radiance) {
@@ -262,7 +262,9 @@ std::vector<std::byte> toBytes(const SparseLight& radiance) {
 }
 
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes) {
-    return rowsFromBytes<TermLight>(bytes);
+    ByteReader in(bytes);
+    auto light = getRows<TermLight>(in);
+    return light && in.atEnd() ? std::move(light) : std::nullopt;
 }
 
 }  // namespace dimmer::cook

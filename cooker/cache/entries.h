@@ -29,8 +29,9 @@ std::optional<GroupLight> groupFromBytes(std::span<const std::byte> bytes);
 std::vector<std::byte> toBytes(const BakedGrid& grid);
 std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes);
 
-std::vector<std::byte> toBytes(const Sparse<ProbeTermLight>& light);
-std::optional<Sparse<ProbeTermLight>> probeLightFromBytes(std::span<const std::byte> bytes);
+// Of several blocks of places.
+std::vector<std::byte> toBytes(std::span<const Sparse<ProbeTermLight>> light);
+std::optional<std::vector<Sparse<ProbeTermLight>>> siteLightFromBytes(std::span<const std::byte> bytes, size_t blocks);
 
 std::vector<std::byte> toBytes(const SparseLight& radiance);
 std::optional<SparseLight> radianceFromBytes(std::span<const std::byte> bytes);

@@ -188,8 +188,11 @@ Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> 
     return KeyBuilder("rays").add(scene).add(kind).addArray(places).finish();
 }
 
-Key sitesKey(const Key& group, const SiteBlock& block) {
-    return KeyBuilder("sites").add(group).add(block.rays).addArray(std::span(block.places_m)).finish();
+Key sitesKey(const Key& group, std::span<const SiteBlock> blocks) {
+    KeyBuilder key("sites");
+    key.add(group);
+    for (const SiteBlock& block : blocks) key.add(block.rays).addArray(std::span(block.places_m));
+    return key.finish();
 }
 
 Key placesKey(const Key& scene, std::span<const float> what) {

@@ -36,7 +36,7 @@ Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene);
 Key raysKey(const Key& scene, std::string_view kind, std::span<const glm::vec3> places);
 
 // Of a light group's light at places in the open.
-Key sitesKey(const Key& group, const SiteBlock& block);
+Key sitesKey(const Key& group, std::span<const SiteBlock> blocks);
 
 // Places in the open.
 Key placesKey(const Key& scene, std::span<const float> what);

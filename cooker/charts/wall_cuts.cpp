@@ -14,7 +14,7 @@ namespace {
 
 constexpr float same_line_m = 2e-3f;
 constexpr float reach_texels = 2.5f;    // thinner than this leaks: bilinear filtering plus half a texel of averaging
-constexpr float length_min_texels = 3;  // a table's leg is no wall
+constexpr float length_min_texels = 3;  // of all stretches between doorways; a table's leg is no wall
 constexpr float margin_m = 5e-3f;       // a cut this close to a rectangle's edge parts nothing
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
@@ -214,6 +214,20 @@ class WallCutter {
         return joined;
     }
 
+    // Between two ends, with what goes on beyond doorways: at a few texels per metre no stretch between them is long. A
+    // row of pillars, which is more gap than wall, is none.
+    static float wallLength(const Cut& cut, const std::vector<Cut>& cuts, float low, float high) {
+        float whole = 0, first = high, last = low;
+        for (const Cut& c : cuts) {
+            const float from = std::max(c.from, low), to = std::min(c.to, high);
+            if (c.axis != cut.axis || std::abs(c.at - cut.at) >= same_line_m || from >= to) continue;
+            whole += to - from;
+            first = std::min(first, from);
+            last = std::max(last, to);
+        }
+        return 2 * whole > last - first ? whole : std::min(cut.to, high) - std::max(cut.from, low);
+    }
+
     // The longest wall first; the others go on in the halves that they stand in.
     void split(std::vector<Piece> pieces, const std::vector<Cut>& cuts, float texels_per_metre,
                std::vector<std::vector<Piece>>& done) const {
@@ -225,11 +239,7 @@ class WallCutter {
         for (const Cut& c : cuts) {
             const int along = 1 - c.axis;
             if (c.at < low[c.axis] + margin_m || c.at > high[c.axis] - margin_m) continue;
-            // With what goes on beyond doorways: at a few texels per metre no stretch between them is long.
-            float length = 0;
-            for (const Cut& o : cuts)
-                if (o.axis == c.axis && std::abs(o.at - c.at) < same_line_m)
-                    length += std::max(0.0f, std::min(o.to, high[along]) - std::max(o.from, low[along]));
+            const float length = wallLength(c, cuts, low[along], high[along]);
             const float needed = std::min(length_min_texels / texels_per_metre, 0.5f * (high[along] - low[along]));
             if (length < needed || length <= best_length) continue;
             best = &c;

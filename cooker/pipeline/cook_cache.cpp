@@ -16,6 +16,12 @@ constexpr std::string_view charts_kind = "charts", light_kind = "light", pack_ki
                            grid_kind = "grid", sites_kind = "sites", radiance_kind = "radiance", rays_kind = "rays",
                            places_kind = "places";
 
+constexpr size_t site_entries_max = 32;  // per light group
+
+size_t blocksPerEntry(size_t blocks) {
+    return std::max<size_t>(1, (blocks + site_entries_max - 1) / site_entries_max);
+}
+
 std::vector<std::byte> toBytes(const PackEntry& entry) {
     format::ByteWriter out;
     out.put(entry.bounces);
@@ -154,44 +160,63 @@ void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
     keep(grid_kind, key, cook::toBytes(grid));
 }
 
-// An entry per block: what is new is written, and nothing else again.
+// An entry holds a few blocks: what is new is written and little else again, and a level of hundreds of lamps has no
+// thousands of files.
 std::vector<Sparse<ProbeTermLight>> CookCache::findSites(const std::string& what, const Key& group,
                                                          std::span<const SiteBlock> blocks) {
-    std::vector<Entry> entries(blocks.size());
+    const size_t per_entry = blocksPerEntry(blocks.size()), count = (blocks.size() + per_entry - 1) / per_entry;
+    std::vector<Entry> entries(count);
     std::vector<Sparse<ProbeTermLight>> light(blocks.size());
-    tbb::parallel_for(size_t{0}, blocks.size(), [&](size_t b) {
-        if (blocks[b].places_m.empty()) return;
-        entries[b] = store_.find(sites_kind, sitesKey(group, blocks[b]));
-        if (entries[b].find == Find::Hit)
-            light[b] = probeLightFromBytes(entries[b].bytes).value_or(Sparse<ProbeTermLight>{});
-    });
-    size_t asked = 0, missing = 0;
-    Find worst = Find::Missing;
-    for (size_t b = 0; b < blocks.size(); ++b) {
-        if (blocks[b].places_m.empty()) continue;
-        ++asked;
-        if (entries[b].find == Find::Hit)
-            used_.push_back(CacheStore::nameOf(sites_kind, sitesKey(group, blocks[b])));
+    const auto of = [&](size_t e) {
+        return blocks.subspan(e * per_entry).first(std::min(per_entry, blocks.size() - e * per_entry));
+    };
+    const auto isEmpty = [&](size_t e) {
+        return std::ranges::all_of(of(e), &std::vector<glm::vec3>::empty, &SiteBlock::places_m);
+    };
+    tbb::parallel_for(size_t{0}, count, [&](size_t e) {
+        if (isEmpty(e)) return;
+        entries[e] = store_.find(sites_kind, sitesKey(group, of(e)));
+        if (entries[e].find != Find::Hit) return;
+        if (auto found = siteLightFromBytes(entries[e].bytes, of(e).size()))
+            std::ranges::move(*found, light.begin() + static_cast<std::ptrdiff_t>(e * per_entry));
         else
-            ++missing;
-        if (entries[b].find == Find::Damaged) worst = Find::Damaged;
+            entries[e].find = Find::Damaged;
+    });
+    size_t missing = 0, asked = 0;
+    Find worst = Find::Missing;
+    for (size_t e = 0; e < count; ++e) {
+        if (isEmpty(e)) continue;
+        asked += of(e).size();
+        if (entries[e].find == Find::Hit)
+            used_.push_back(CacheStore::nameOf(sites_kind, sitesKey(group, of(e))));
+        else
+            missing += of(e).size();
+        if (entries[e].find == Find::Damaged) worst = Find::Damaged;
     }
     std::string why;
-    if (missing == asked || worst == Find::Damaged)
-        why = whyMissing(worst, partsOfGroup(what));
-    else if (missing > 0)
-        why = fmt::format("{} of {} groups of places are new", missing, asked);
-    lines_.push_back({"light at probe places: " + what, missing == 0, missing == 0 ? "" : why});
+    if (missing > 0)
+        why = missing == asked || worst == Find::Damaged
+                  ? whyMissing(worst, partsOfGroup(what))
+                  : fmt::format("{} of {} groups of places are new", missing, asked);
+    lines_.push_back({"light at probe places: " + what, missing == 0, why});
     return light;
 }
 
 void CookCache::keepSites(const Key& group, std::span<const SiteBlock> blocks,
                           std::span<const Sparse<ProbeTermLight>> light, std::span<const size_t> fresh) {
-    std::vector<Expected<void>> kept(fresh.size());
-    const auto keyOf = [&](size_t i) { return sitesKey(group, blocks[fresh[i]]); };
-    tbb::parallel_for(size_t{0}, fresh.size(),
-                      [&](size_t i) { kept[i] = store_.keep(sites_kind, keyOf(i), cook::toBytes(light[fresh[i]])); });
-    for (size_t i = 0; i < fresh.size(); ++i) note(CacheStore::nameOf(sites_kind, keyOf(i)), kept[i]);
+    const size_t per_entry = blocksPerEntry(blocks.size());
+    std::vector<size_t> first;  // blocks of the entries that are new
+    for (const size_t b : fresh)
+        if (first.empty() || b / per_entry != first.back() / per_entry) first.push_back(b - b % per_entry);
+    std::vector<Expected<void>> kept(first.size());
+    const auto of = [&](auto all, size_t i) {
+        return all.subspan(first[i]).first(std::min(per_entry, all.size() - first[i]));
+    };
+    tbb::parallel_for(size_t{0}, first.size(), [&](size_t i) {
+        kept[i] = store_.keep(sites_kind, sitesKey(group, of(blocks, i)), cook::toBytes(of(light, i)));
+    });
+    for (size_t i = 0; i < first.size(); ++i)
+        note(CacheStore::nameOf(sites_kind, sitesKey(group, of(blocks, i))), kept[i]);
 }
 
 std::optional<std::vector<glm::vec3>> CookCache::findPlaces(const Key& key) {

@@ -34,6 +34,7 @@ constexpr uint32_t rarity_seed = 0x2c1b3c6du;
 // Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
 // sites. Small levels get more, as noise misleads where to put the few probes they have.
 constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
+constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
 // Of a light set, beside always-on light: sets are off at times.
 constexpr float weight_of_sets = 0.05f;
@@ -413,12 +414,14 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
         std::vector<Row> rows(places);
         tbb::parallel_for(size_t{0}, parts.size(), [&](size_t p) {
             const auto& [b, begin, end, first] = parts[p];
-            PlaceTrace trace(gatherer, lights, all ? radiance : some, reports, settings, wanted);
             std::vector<RowEnds> ends;
             rays.get(b, begin, end, ends);
-            for (size_t i = 0; i < end - begin; ++i)
-                traced += trace.trace(blocks_[b].places_m[begin + i], blocks_[b].rays,
-                                      ends.empty() ? nullptr : &ends[i], rows[first + i]);
+            tbb::parallel_for(tbb::blocked_range<size_t>(0, end - begin, sites_per_task), [&](const auto& range) {
+                PlaceTrace trace(gatherer, lights, all ? radiance : some, reports, settings, wanted);
+                for (size_t i = range.begin(); i < range.end(); ++i)
+                    traced += trace.trace(blocks_[b].places_m[begin + i], blocks_[b].rays,
+                                          ends.empty() ? nullptr : &ends[i], rows[first + i]);
+            });
             rays.take(b, begin, ends);
             progress.advance(end - begin);
         });

@@ -197,16 +197,22 @@ TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
         for (json& node : level.document["nodes"])
             if (node.value("name", "") == "lamp3") node["translation"][0] = x;
     };
-    const auto placesKept = [&] {
-        return std::ranges::count_if(std::filesystem::directory_iterator(folder.path / "cache"), [](const auto& entry) {
-            return entry.path().filename().string().starts_with("places-");
-        });
+    const auto kept = [&](const char* kind) {
+        return std::ranges::count_if(
+            std::filesystem::directory_iterator(folder.path / "cache"),
+            [&](const auto& entry) { return entry.path().filename().string().starts_with(kind); });
     };
-    const auto before = placesKept();
-    EXPECT_GT(before, 2);  // how much is free, all over the level, and around each lamp
+    const auto places = kept("places-"), sites = kept("sites-");
+    EXPECT_GT(places, 2);  // how much is free, all over the level, and around each lamp
+    // Four groups at the blocks all over the level, around each lamp and at the box's corners.
+    const auto blocks = sites / 4;
+    EXPECT_EQ(sites, 4 * blocks);
+    EXPECT_GT(blocks, 2);
     move(8.7);
     EXPECT_EQ(made(level), stages);
-    EXPECT_EQ(placesKept(), before + 1);  // around the lamp that moved
+    EXPECT_EQ(kept("places-"), places + 1);  // around the lamp that moved
+    // The lamp's own group at all blocks, the other three at the one around it.
+    EXPECT_EQ(kept("sites-"), sites + blocks + 3);
     for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache"))
         if (entry.path().filename().string().starts_with("radiance-")) std::filesystem::remove(entry.path());
     move(8.6);
@@ -253,16 +259,18 @@ TEST_F(CachedCook, APackThatIsFoundKeepsItsParts) {
 }
 
 TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
-    const LevelFile level = houseOfTwo();
+    const LevelFile level = houseWithGrid();
     made(level);
-    size_t damaged = 0;
+    std::set<std::string> damaged;
     for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache")) {
         std::fstream file(entry.path(), std::ios::in | std::ios::out | std::ios::binary);
         file.seekp(static_cast<std::streamoff>(entry.file_size() / 2 + 20));
         file.put('!').put('?');
-        ++damaged;
+        const std::string name = entry.path().filename().string();
+        damaged.insert(name.substr(0, name.find('-')));
     }
-    EXPECT_EQ(damaged, 9u);
+    EXPECT_THAT(damaged,
+                ElementsAre("charts", "grid", "ledger", "light", "pack", "places", "radiance", "rays", "sites"));
     SilentProgress silent;
     const CookResult result = run(level, true);
     for (const CacheLine& line : result.stats.cache) {
