@@ -13,9 +13,10 @@ namespace dimmer::cook {
 namespace {
 
 constexpr float same_line_m = 2e-3f;
-constexpr float reach_texels = 2.5f;    // thinner than this leaks: bilinear filtering plus half a texel of averaging
-constexpr float length_min_texels = 3;  // of all stretches between doorways; a table's leg is no wall
-constexpr float margin_m = 5e-3f;       // a cut this close to a rectangle's edge parts nothing
+constexpr float reach_texels = 2.5f;     // thinner than this leaks: bilinear filtering plus half a texel of averaging
+constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
+constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
+constexpr float margin_m = 5e-3f;        // a cut this close to a rectangle's edge parts nothing
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
 struct Trace {
@@ -215,7 +216,7 @@ class WallCutter {
     }
 
     // Between two ends, with what goes on beyond doorways: at a few texels per metre no stretch between them is long. A
-    // row of pillars, which is more gap than wall, is none.
+    // row of pillars, most of which is gap, is none.
     static float wallLength(const Cut& cut, const std::vector<Cut>& cuts, float low, float high) {
         float whole = 0, first = high, last = low;
         for (const Cut& c : cuts) {
@@ -225,7 +226,7 @@ class WallCutter {
             first = std::min(first, from);
             last = std::max(last, to);
         }
-        return 2 * whole > last - first ? whole : std::min(cut.to, high) - std::max(cut.from, low);
+        return wall_share_min * (last - first) < whole ? whole : std::min(cut.to, high) - std::max(cut.from, low);
     }
 
     // The longest wall first; the others go on in the halves that they stand in.
