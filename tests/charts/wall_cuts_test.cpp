@@ -58,8 +58,8 @@ TEST(WallCuts, ARowOfPillarsIsNoWall) {
         Scene scene;
         const uint32_t white = addMaterial(scene, lambert(0.5f));
         addSolid(scene, "floor", {0, -0.1f, 0}, {4, 0.1f, 5}, white);
-        for (int i = 0; i < 6; ++i)  // 0.4 m each, 1.6 m between them
-            addSolid(scene, "pillar", {0, 1.35f, -5 + 2 * static_cast<float>(i)}, {0.1f, 1.35f, 0.2f}, white);
+        for (int i = 0; i < 6; ++i)  // 0.3 m each, 1.7 m between them
+            addSolid(scene, "pillar", {0, 1.35f, -5 + 2 * static_cast<float>(i)}, {0.1f, 1.35f, 0.15f}, white);
         const size_t before = scene.meshes[3].triangles.size();  // the floor's upper side
         cutAtWalls(scene, density);
         EXPECT_EQ(scene.meshes[3].triangles.size(), before) << density;
