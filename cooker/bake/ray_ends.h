@@ -96,7 +96,8 @@ struct RememberedRays {
     RayEnds gather;  // of the final gather, the first `kept_rays_max` of each receiver
 };
 
-// At some 18 bits each 2 kB a receiver, where single terms need so many; `preview` ends at 512.
+// At some 18 bits each 2 kB a receiver and what those through leaves read, where single terms need so many; `preview`
+// ends at 512.
 inline constexpr uint32_t kept_rays_max = 1024;
 
 }  // namespace dimmer::cook
