@@ -1,7 +1,10 @@
 // Rays whose ends are remembered bring what they brought when they were traced, past doors' leaves too.
 #include <bake/baked_scene.h>
+#include <bake/final_gather.h>
 #include <bake/gather.h>
 #include <bake/test_scenes.h>
+
+#include <numeric>
 
 namespace dimmer::cook::test {
 namespace {
@@ -85,6 +88,40 @@ TEST(RememberedRays, BringWhatTheyBroughtWhenTheyWereTraced) {
         EXPECT_GT(through, 1000u);
         EXPECT_EQ(over_sky > 0, !roof);
     }
+}
+
+// A term that needs more rays than were asked for when the row was made, with rays aimed at doors besides.
+TEST(RememberedRays, GoOnWhereTheyEnd) {
+    const BakedScene level(rooms(true));
+    const Gathering gathering(level);
+    std::vector<uint32_t> terms(gathering.paths.termCount());
+    std::iota(terms.begin(), terms.end(), 0u);
+    const std::vector<float> floors(terms.size(), 0.0f);
+    FinalGather<Gathered> gather(gathering.gatherer);
+    const auto lightAt = [&](size_t receiver, uint32_t rays, RowEnds* row) {
+        FinalGatherOptions options;
+        options.rays_max = rays;
+        options.noise_max = 0;
+        options.floor_lux = floors;
+        std::vector<ReceiverLight> light;
+        gather.gather(gathering.gatherer.at(receiver), terms, gathering.outgoing, options, light, row);
+        std::vector<glm::vec3> lux;
+        for (const ReceiverLight& l : light) lux.push_back(l.light.irradiance_lux);
+        return lux;
+    };
+    size_t through = 0;
+    for (size_t i = 0; i < level.texels.size(); i += 3) {
+        RowEnds row;
+        lightAt(i, 2 * rays_per_round, &row);
+        ASSERT_EQ(row.ends.size(), 2 * rays_per_round);
+        row.next = 0;  // as it comes from a store
+        EXPECT_EQ(lightAt(i, 4 * rays_per_round, &row), lightAt(i, 4 * rays_per_round, nullptr)) << i;
+        EXPECT_EQ(row.ends.size(), 4 * rays_per_round);
+        row.next = 0;
+        EXPECT_EQ(lightAt(i, 4 * rays_per_round, &row), lightAt(i, 4 * rays_per_round, nullptr)) << i;
+        through += !row.through.empty();
+    }
+    EXPECT_GT(through, 50u);
 }
 
 // Told that rays end elsewhere, the gather believes it: they are not traced.
