@@ -186,7 +186,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_flag(
         "--suggest-combinations", a->suggest_combinations,
-        "print the pairs of doors that lose light which needs both (each a warning, too) for dimmer_combinations");
+        "print the pairs of doors whose light depends on each other (each a warning, too) for dimmer_combinations");
     c->add_flag("--per-set-passes", a->options.per_set_passes,
                 "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
     c->add_option("--grid-baseline", a->options.grid_baseline,

@@ -123,7 +123,7 @@ class Bake {
           settings_(settings),
           progress_(progress),
           store_(store),
-          paths_(rays.scene()),
+          paths_(rays.scene(), doorsInSight(rays)),
           groups_(paths_.groupCount()),
           found_(groups_),
           radiance_(groups_) {

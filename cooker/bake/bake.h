@@ -81,11 +81,11 @@ struct BakedGrid {
     double free_volume_m3 = 0;     // of the level: what lies in the open
 };
 
-// Two doors whose light needs both, while no combination covers them.
+// Two doors whose light depends on how both stand, while no combination covers them.
 struct DoorPair {
     uint32_t first = 0, second = 0;  // into Scene::doors
-    // Luminous flux over paths that need both doors, over that which needs only the one of the two with less: what is
-    // lost without the combination.
+    // What is off without the combination while both are open, at most: luminous flux over paths that need one open and
+    // ask how the other stands, over all that opening the lesser of the two alone changes.
     float loss = 0;
 };
 
@@ -93,9 +93,9 @@ struct DoorPair {
 struct DoorFlux {
     struct Pair {
         uint32_t first = 0, second = 0;
-        double flux = 0;  // needs both
+        double flux = 0;  // needs one open, and the other open or closed: off while both are open
     };
-    std::vector<double> alone;  // per door, needs it and no other
+    std::vector<double> alone;  // per door: what opening it changes while all others are closed
     std::vector<Pair> pairs;    // that some surface sees together and no combination covers
 };
 

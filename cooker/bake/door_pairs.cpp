@@ -1,5 +1,6 @@
 #include <bake/door_pairs.h>
 
+#include <bake/sampling.h>
 #include <bake/series.h>
 
 #include <algorithm>
@@ -13,7 +14,9 @@ namespace {
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
 
-using Pair = std::pair<uint32_t, uint32_t>;
+// Between two doors' leaves, before they count as out of sight of each other; and how far off the leaves they start.
+constexpr uint32_t sight_rays = 256;
+constexpr float sight_lift_m = 0.01f;
 
 BakeSettings few(BakeSettings settings, size_t texels) {
     const size_t rays = std::clamp(measuring_rays / texels, texel_rays_min, texel_rays_max);
@@ -22,7 +25,7 @@ BakeSettings few(BakeSettings settings, size_t texels) {
     return settings;
 }
 
-bool covered(const Scene& scene, const Pair& pair) {
+bool covered(const Scene& scene, const DoorIndices& pair) {
     return std::ranges::any_of(scene.combinations, [&](const std::vector<ElementRef>& combination) {
         const auto names = [&](uint32_t door) {
             return std::ranges::any_of(combination, [&](const ElementRef& e) { return e.is_door && e.index == door; });
@@ -32,14 +35,14 @@ bool covered(const Scene& scene, const Pair& pair) {
     });
 }
 
-std::set<Pair> seenTogether(const Scene& scene, const Sparse<uint32_t>& doors_seen) {
-    std::set<Pair> pairs;
+std::set<DoorIndices> seenTogether(const Scene& scene, const Sparse<uint32_t>& doors_seen) {
+    std::set<DoorIndices> pairs;
     for (size_t i = 0; i < doors_seen.rows(); ++i) {
         const auto row = doors_seen.row(i);  // ascending
         for (size_t a = 0; a < row.size(); ++a)
             for (size_t b = a + 1; b < row.size(); ++b) pairs.insert({row[a], row[b]});
     }
-    std::erase_if(pairs, [&](const Pair& pair) { return covered(scene, pair); });
+    std::erase_if(pairs, [&](const DoorIndices& pair) { return covered(scene, pair); });
     return pairs;
 }
 
@@ -50,7 +53,51 @@ std::vector<uint32_t> doorsOf(const Term& term) {
     return doors;
 }
 
+// Leaves where they stand closed, and open.
+class LeafPoints {
+   public:
+    explicit LeafPoints(const RayScene& rays) : rays_(rays), triangles_(rays.scene().doors.size()) {
+        for (uint32_t t = 0; t < rays.triangles().size(); ++t)
+            if (const uint32_t c = rays.triangles()[t].condition; c != no_condition) triangles_[c / 2].push_back(t);
+    }
+    // The i-th of many beside the door's leaves, on either side.
+    std::optional<glm::vec3> point(uint32_t door, uint32_t i) const {
+        const auto& triangles = triangles_[door];
+        if (triangles.empty()) return std::nullopt;
+        const uint32_t triangle = triangles[hash(i, door) % triangles.size()];
+        glm::vec2 at = sequence2d(i, door);
+        if (at.x + at.y > 1) at = 1.0f - at;
+        const float side = hash(i) & 1 ? sight_lift_m : -sight_lift_m;
+        return rays_.pointOn(triangle, at.x, at.y) + side * rays_.triangles()[triangle].normal;
+    }
+
+   private:
+    const RayScene& rays_;
+    std::vector<std::vector<uint32_t>> triangles_;  // per door
+};
+
 }  // namespace
+
+std::vector<DoorIndices> doorsInSight(const RayScene& rays) {
+    const LeafPoints leaves(rays);
+    const auto doors = static_cast<uint32_t>(rays.scene().doors.size());
+    const auto inSight = [&](uint32_t a, uint32_t b) {
+        for (uint32_t i = 0; i < sight_rays; ++i) {
+            const auto from = leaves.point(a, i), to = leaves.point(b, i);
+            if (!from || !to) return false;
+            const glm::vec3 way = *to - *from;
+            const float distance = glm::length(way);
+            if (!(distance > 0) || rays.transmittance(*from, way / distance, distance, Surfaces::Walls) > 0)
+                return true;
+        }
+        return false;
+    };
+    std::vector<DoorIndices> pairs;
+    for (uint32_t a = 0; a < doors; ++a)
+        for (uint32_t b = a + 1; b < doors; ++b)
+            if (inSight(a, b)) pairs.emplace_back(a, b);
+    return pairs;
+}
 
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
                                std::span<const uint8_t> groups, Progress& progress, RayEnds* links) {
@@ -58,24 +105,26 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
     const auto pairs = seenTogether(named, series.doors_seen);
     std::vector<DoorFlux> flux(groups.size());
     if (pairs.empty()) return flux;
-    for (const Pair& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
-    const DoorPaths paths(named);
+    for (const DoorIndices& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
+    const DoorPaths paths(named, doorsInSight(gatherer.rays()));
     const Gatherer keeping_pairs(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), gatherer.emitters(), paths);
     const Series measured =
         expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
 
     for (DoorFlux& f : flux) {
         f.alone.resize(named.doors.size());
-        for (const Pair& pair : pairs) f.pairs.push_back({pair.first, pair.second, 0});
+        for (const DoorIndices& pair : pairs) f.pairs.push_back({pair.first, pair.second});
     }
     for (uint32_t t = 0; t < paths.termCount(); ++t) {
-        const auto doors = doorsOf(paths.terms()[t]);
-        DoorFlux& f = flux[paths.terms()[t].group];
-        if (doors.size() == 1) f.alone[doors[0]] += measured.reports[t].energy;
-        if (doors.size() != 2) continue;
+        const Term& term = paths.terms()[t];
+        const auto doors = doorsOf(term);
+        const double energy = measured.reports[t].energy;
+        DoorFlux& f = flux[term.group];
+        for (const uint32_t door : doors)
+            if (term.doors_open.empty() || term.doors_open == std::vector{door}) f.alone[door] += energy;
+        if (doors.size() != 2 || term.doors_open.empty()) continue;
         const auto pair = pairs.find({doors[0], doors[1]});
-        if (pair != pairs.end())
-            f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += measured.reports[t].energy;
+        if (pair != pairs.end()) f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += energy;
     }
     return flux;
 }
@@ -93,8 +142,8 @@ std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeS
         const uint32_t first = flux[0].pairs[p].first, second = flux[0].pairs[p].second;
         const auto alone = [&](uint32_t door) { return sum([&](const DoorFlux& f) { return f.alone[door]; }); };
         const double less = std::min(alone(first), alone(second));
-        const double together = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
-        const auto loss = static_cast<float>(less > 0 ? together / less : 0);
+        const double off = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
+        const auto loss = static_cast<float>(less > 0 ? off / less : 0);
         if (loss > settings.threshold) found.push_back({first, second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);

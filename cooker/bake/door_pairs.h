@@ -1,4 +1,5 @@
-// Which pairs of doors depend on each other so much that the level should name their combination.
+// Which pairs of doors see each other, and which depend on each other so much that the level should name their
+// combination.
 #pragma once
 
 #include <bake/series.h>
@@ -6,6 +7,10 @@
 #include <vector>
 
 namespace dimmer::cook {
+
+// The pairs (first < second) between whose leaves, closed or open, some ray passes: no wall is in its way. The light of
+// others hardly asks how both stand. Deterministic; some hundred rays a pair.
+std::vector<DoorIndices> doorsInSight(const RayScene& rays);
 
 // Per light group; of groups that are not asked for, nothing. `series` is the bake's own. Measured by another of few
 // rays that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing. `links`: as

@@ -32,10 +32,12 @@ std::optional<Conditions> join(const Conditions& a, const Conditions& b) {
 }
 
 // Per light group, the paths that are kept.
-std::vector<std::set<Conditions>> keptPaths(const Scene& scene, uint32_t groups) {
+std::vector<std::set<Conditions>> keptPaths(const Scene& scene, std::span<const DoorIndices> closed_together,
+                                            uint32_t groups) {
     std::set<Conditions> everyone;
     for (uint32_t door = 0; door < scene.doors.size(); ++door) addStates({door}, 0, {}, everyone);
     everyone.insert(Conditions{});
+    for (const auto& [a, b] : closed_together) everyone.insert(Conditions{2 * a, 2 * b});
     std::vector<std::set<Conditions>> kept(groups, everyone);
     for (const auto& combination : scene.combinations) {
         std::vector<uint32_t> doors;
@@ -53,6 +55,25 @@ std::vector<std::set<Conditions>> keptPaths(const Scene& scene, uint32_t groups)
     return kept;
 }
 
+// What a path is taken for where it is not kept: doors that no combination names together are baked each with the
+// others closed, so that they have to be need not be said. That one has to be open cannot be left out.
+std::optional<Conditions> nearestKept(const Conditions& path, const auto& kept) {
+    for (std::set<Conditions> tried = {path}; !tried.empty();) {
+        std::set<Conditions> shorter;
+        for (const Conditions& c : tried) {
+            if (kept.contains(c)) return c;
+            for (size_t i = 0; i < c.size(); ++i) {
+                if (c[i] & 1) continue;
+                Conditions rest = c;
+                rest.erase(rest.begin() + static_cast<ptrdiff_t>(i));
+                shorter.insert(std::move(rest));
+            }
+        }
+        tried = std::move(shorter);
+    }
+    return std::nullopt;
+}
+
 Term makeTerm(uint32_t group, const Conditions& conditions) {
     Term term{group, {}, {}};
     for (uint32_t c : conditions) (c & 1 ? term.doors_open : term.doors_closed).push_back(c / 2);
@@ -68,10 +89,10 @@ uint32_t groupIdentity(const Scene& scene, uint32_t group) {
     return id;
 }
 
-DoorPaths::DoorPaths(const Scene& scene)
+DoorPaths::DoorPaths(const Scene& scene, std::span<const DoorIndices> closed_together)
     : condition_count_(2 * static_cast<uint32_t>(scene.doors.size())),
       group_count_(1 + static_cast<uint32_t>(scene.light_sets.size())) {
-    const auto kept = keptPaths(scene, group_count_);
+    const auto kept = keptPaths(scene, closed_together, group_count_);
     std::set<Conditions> all;
     for (const auto& of_group : kept) all.insert(of_group.begin(), of_group.end());
     paths_.assign(all.begin(), all.end());
@@ -79,12 +100,13 @@ DoorPaths::DoorPaths(const Scene& scene)
     std::map<Conditions, uint32_t> index;
     for (const Conditions& path : paths_) index.emplace(path, static_cast<uint32_t>(index.size()));
     const auto find = [&](const std::optional<Conditions>& path) {
-        const auto it = path ? index.find(*path) : index.end();
-        return it == index.end() ? no_path : it->second;
+        const auto kept_path = path ? nearestKept(*path, index) : std::nullopt;
+        return kept_path ? index.at(*kept_path) : no_path;
     };
     for (const Conditions& path : paths_) {
         for (uint32_t c = 0; c < condition_count_; ++c) {
             with_.push_back(find(join(path, {c})));
+            needs_.push_back(std::ranges::binary_search(path, c));
             Conditions rest = path;
             std::erase(rest, c);
             without_.push_back(std::ranges::binary_search(path, c ^ 1) ? no_path : find(rest));
@@ -103,6 +125,12 @@ DoorPaths::DoorPaths(const Scene& scene)
             path_of_.push_back(p);
             group_of_.push_back(g);
             only_door_.push_back(paths_[p].size() == 1 ? paths_[p][0] / 2 : no_door);
+        }
+    for (uint32_t g = 0; g < group_count_; ++g)
+        for (uint32_t p = 0; p < paths_.size(); ++p) {
+            if (kept[g].contains(paths_[p])) continue;
+            const auto instead = nearestKept(paths_[p], kept[g]);
+            if (instead) term_of_[p * group_count_ + g] = term_of_[index.at(*instead) * group_count_ + g];
         }
 }
 

@@ -12,6 +12,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 namespace dimmer::cook {
@@ -20,6 +22,9 @@ inline constexpr uint32_t free_path = 0;  // touches no door
 inline constexpr uint32_t no_path = UINT32_MAX;
 inline constexpr uint32_t no_term = UINT32_MAX;
 inline constexpr uint32_t no_door = UINT32_MAX;
+
+// Into Scene::doors, the first less than the second.
+using DoorIndices = std::pair<uint32_t, uint32_t>;
 
 // Light group 0 is all always-on light; group 1 + s is light set s.
 inline constexpr uint32_t always_group = 0;
@@ -48,12 +53,15 @@ enum class Leaf {
     Either,  // the path parts here: one reflects off the leaf, one goes on
 };
 
-// Kept: every term with at most one door, and what `dimmer_combinations` names with all of its parts. A combination
-// with a light set keeps that set's terms alone, one without keeps every group's. Immutable; look-ups in tables of
-// paths^2 and paths * groups numbers.
+// Kept: every term with at most one door, those of two doors that both have to be closed, where these see each other,
+// and what `dimmer_combinations` names with all of its parts. A combination with a light set keeps that set's terms
+// alone, one without keeps every group's. Light that needs more doors than are kept together goes to the term without
+// some that it needs closed: states with no door open, and with one, have it. Immutable; look-ups in tables of paths^2
+// and paths * groups numbers.
 class DoorPaths {
    public:
-    explicit DoorPaths(const Scene& scene);
+    // `closed_together`: see doorsInSight() (bake/door_pairs.h).
+    explicit DoorPaths(const Scene& scene, std::span<const DoorIndices> closed_together = {});
 
     uint32_t doorCount() const { return condition_count_ / 2; }
     uint32_t pathCount() const { return static_cast<uint32_t>(paths_.size()); }
@@ -66,9 +74,9 @@ class DoorPaths {
     // The term's place among those of its group.
     uint32_t numberInGroup(uint32_t term) const { return number_in_group_[term]; }
 
-    // The path that needs `condition` too; no_path where none is kept or the two contradict.
+    // The path that needs `condition` too, or what is kept instead; no_path where there is none or the two contradict.
     uint32_t with(uint32_t path, uint32_t condition) const { return with_[path * condition_count_ + condition]; }
-    bool needs(uint32_t path, uint32_t condition) const { return with(path, condition) == path; }
+    bool needs(uint32_t path, uint32_t condition) const { return needs_[path * condition_count_ + condition] != 0; }
     // `own`: the condition under which the receiver itself is there (a leaf's), or no_condition.
     Leaf leaf(uint32_t path, uint32_t own, uint32_t condition) const {
         if (own == condition || needs(path, condition)) return Leaf::There;
@@ -98,6 +106,7 @@ class DoorPaths {
     uint32_t condition_count_ = 0, group_count_ = 1;
     std::vector<std::vector<uint32_t>> paths_;  // conditions, ascending
     std::vector<uint32_t> with_;                // path, condition
+    std::vector<uint8_t> needs_;                // path, condition
     std::vector<uint32_t> without_;             // path, condition: without it; no_path where it needs the opposite
     std::vector<uint32_t> joined_;              // path, path
     std::vector<uint32_t> term_of_;             // path, group

@@ -134,27 +134,36 @@ class TexelSampler {
         result.reflectance +=
             rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
         ++usable.tried;
-        if (!insideGeometry(position, s.face, Surfaces::All)) {
+        const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
+        if (!insideGeometry(s.face, nearest)) {
             result.points.push_back({position, s.face});
             return;
         }
         ++usable.dropped;
-        const bool on_leaf = rays_.triangles()[triangle].condition != no_condition;
-        if (rays_.anyLeaf() && !on_leaf && usable.in_leaf.size() < samples_max_ &&
-            !insideGeometry(position, s.face, Surfaces::Walls))
+        const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
+        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !insideGeometry(s.face, stays))
             usable.in_leaf.push_back({position, s.face});
+    }
+
+    // Without the leaves of doors, but for one that the triangle itself is of.
+    std::optional<Hit> nearestWithout(uint32_t triangle, glm::vec3 position, glm::vec3 direction) const {
+        const auto wall = rays_.nearest(position, direction, far_away_m, 0, Surfaces::Walls);
+        const uint32_t own = rays_.triangles()[triangle].condition;
+        if (own != no_condition)
+            for (const Hit& hit : rays_.leavesAlong(position, direction, wall ? wall->distance_m : far_away_m))
+                if (rays_.triangles()[hit.triangle].condition == own) return hit;
+        return wall;
     }
 
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
     // none; more than one, because where solids touch, a ray may as well report the neighbour's front.
-    bool insideGeometry(glm::vec3 position, uint32_t face, Surfaces surfaces) const {
+    bool insideGeometry(uint32_t face, auto&& nearest) const {
         const TangentFrame& f = unwrap_.frames[face];
         uint32_t backs = 0;
         for (uint32_t i = 0; i < inside_test_rays; ++i) {
             if (i == inside_test_rays / 4 && backs == 0) return false;
             const glm::vec3 d = cosineDirection(sequence2d(i, face));
-            const glm::vec3 direction = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
-            const auto hit = rays_.nearest(position, direction, 1e30f, 0, surfaces);
+            const auto hit = nearest(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
             backs += hit && hit->back && !doubleSided(hit->triangle);
         }
         return 2 * backs > inside_test_rays;

@@ -108,8 +108,8 @@ void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& sta
                           second = "door:" + scene.doors[pair.second].name;
         stats.suggested_combinations.emplace_back(first, second);
         stats.warnings.push_back(
-            fmt::format("{}: '{}' and '{}' depend on each other: {:.0f} % of the light that the lesser of them moves "
-                        "needs both, and is left out; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations' "
+            fmt::format("{}: '{}' and '{}' depend on each other: up to {:.0f} % of the light that the lesser of them "
+                        "moves is off while both are open; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations' "
                         "(--suggest-combinations prints the list)",
                         scene.file, first, second, 100 * static_cast<double>(pair.loss), first, second));
     }

@@ -1,5 +1,6 @@
 #include <pipeline/dissect.h>
 
+#include <bake/door_pairs.h>
 #include <bake/final_gather.h>
 #include <bake/sampling.h>
 #include <bake/series.h>
@@ -61,7 +62,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
         return fail(ErrorCode::BadInput, "the pack's pages are not those of this level; cook the level again");
     bake->texels = sampleTexels(*bake->rays, bake->charts, quality.samples_per_texel);
     bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
-    bake->paths.emplace(bake->scene);
+    bake->paths.emplace(bake->scene, doorsInSight(*bake->rays));
     bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
     bake->settings = bakeSettings(settings->profile, quality, bake->scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
