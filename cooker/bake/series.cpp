@@ -2,6 +2,7 @@
 
 #include <bake/direct.h>
 #include <bake/door_surroundings.h>
+#include <bake/links.h>
 #include <bake/sampling.h>
 
 #include <atomic>
@@ -82,7 +83,7 @@ class Expansion {
     // and sky leave behind which receivers see one another: the links that the series follows.
     void directPass() {
         progress_.stage("direct light and links", receivers_);
-        links_.assign(receivers_ * settings_.series_rays, no_index);
+        links_ = Links(receivers_, settings_.series_rays);
         const bool remembers = ends_ && ends_->rows() == 0;
         if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_), gatherer_.paths().pathCount());
         const RayEnds* known = remembers ? nullptr : ends_;
@@ -101,6 +102,7 @@ class Expansion {
             for (uint32_t t = 0; t < terms_; ++t) sum.setWanted(t, runs(t));
             std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
+            std::vector<uint32_t> hits(settings_.series_rays);
             GatherLinks links;
             RowEnds ends;
             std::vector<RowEnds> all_ends;
@@ -120,8 +122,10 @@ class Expansion {
                 for (uint32_t t : full.touched())
                     if (luminance(full[t].irradiance_lux) > 0) stored_row.push_back({t, full[t]});
                 full.clear();
-                links = {{&links_[i * settings_.series_rays], settings_.series_rays}, {}, {}};
+                std::ranges::fill(hits, no_index);
+                links = {hits, {}, {}};
                 gatherer_.gather(gatherer_.at(i), own_options, nullptr, sum, &links);
+                links_.put(i, hits);
                 if (remembers) all_ends.push_back(ends);
                 std::ranges::sort(links.doors);
                 links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
@@ -186,16 +190,18 @@ class Expansion {
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
+            std::vector<uint32_t> hits(settings_.series_rays);
             for (size_t i = begin; i < end; ++i) {
                 const uint32_t own = gatherer_.conditionOf(i);
-                for (size_t k = i * settings_.series_rays; k < (i + 1) * settings_.series_rays; ++k) {
-                    if (const size_t ahead = k + links_ahead; ahead < links_.size() && links_[ahead] != no_index)
-                        radiance.prefetch(links_[ahead]);
-                    if (links_[k] == no_index) continue;
+                links_.get(i, hits);
+                for (size_t k = 0; k < hits.size(); ++k) {
+                    if (k + links_ahead < hits.size() && hits[k + links_ahead] != no_index)
+                        radiance.prefetch(hits[k + links_ahead]);
+                    if (hits[k] == no_index) continue;
                     if (own == no_condition)
-                        for (const TermLight& l : radiance.row(links_[k])) sum[l.term] += l;
+                        for (const TermLight& l : radiance.row(hits[k])) sum[l.term] += l;
                     else
-                        addMoved(radiance.row(links_[k]), free_path, own, 1, sum);
+                        addMoved(radiance.row(hits[k]), free_path, own, 1, sum);
                 }
                 for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
                     addMoved(radiance.row(link.receiver), link.path, own, share_through_doors, sum);
@@ -453,7 +459,7 @@ class Expansion {
     RayEnds* ends_;                            // may be null
     std::vector<uint8_t> running_;             // per light group: its light is still followed
     std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
-    std::vector<uint32_t> links_;              // series_rays per receiver
+    Links links_;                              // series_rays of each receiver
     Sparse<GatherLinks::ThroughDoors> door_links_;
     Sparse<uint32_t> doors_seen_;
     std::vector<float> least_;  // lux per term, empty before the first bounce

@@ -35,8 +35,9 @@ struct Series {
 };
 
 // Deterministic for any number of threads, and each light group's part is the same whichever others there are.
-// Memory while it runs: 4 bytes * series_rays per texel. `groups`: per light group, whether to follow its light; empty:
-// all. `links`: where the rays end, where that is known, to be filled in where it is empty; at least series_rays each.
+// Memory while it runs: series_rays receivers' numbers per texel, 2 to 3 bytes each. `groups`: per light group, whether
+// to follow its light; empty: all. `links`: where the rays end, where that is known, to be filled in where it is empty;
+// at least series_rays each.
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
 

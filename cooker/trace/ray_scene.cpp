@@ -150,6 +150,11 @@ RayScene::RayScene(const Scene& scene) : scene_(scene) {
         const SceneMesh& mesh = scene.meshes[m];
         if (mesh.lighting == Lighting::Dynamic) continue;
         any_leaf |= mesh.door.has_value();
+        if (mesh.door && !mesh.positions_m.empty()) {
+            glm::vec3 low = mesh.positions_m[0], high = low;
+            for (const glm::vec3 p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+            leaf_boxes_.add(low, high);
+        }
         for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
             const auto level_triangle = static_cast<uint32_t>(triangles_.size());
             triangles_.push_back({.mesh = m,
@@ -260,7 +265,7 @@ float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float dista
 
 LeafHits RayScene::leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
     LeafHits found;
-    if (!leaves_) return found;
+    if (!leaves_ || !leaf_boxes_.mayHit(origin, direction, distance_m)) return found;
     Collector collector{.context = {}, .hits = found, .triangle_of = leaves_->triangle_of};
     rtcInitIntersectContext(&collector.context);
     collector.context.filter = collect;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <scene/scene.h>
+#include <trace/leaf_boxes.h>
 
 #include <array>
 #include <cstdint>
@@ -99,6 +100,7 @@ class RayScene {
     const Scene& scene_;
     std::vector<LevelTriangle> triangles_;
     std::unique_ptr<Embree> all_, walls_, leaves_;  // the last two only where there are doors
+    LeafBoxes leaf_boxes_;
     glm::vec3 bounds_min_{0}, bounds_max_{0};
 };
 
