@@ -19,7 +19,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     const size_t receivers = gatherer.texels().size();
     progress.stage("final gather", receivers);
     const std::vector<float> floors = noiseFloors(series, gatherer.paths().groupCount());
-    const FinalGatherOptions everywhere = finalGatherOptions(settings, floors);
+    const FinalGatherOptions options = finalGatherOptions(settings, floors);
     std::atomic<uint64_t> all_traced = 0;
     const bool remembers = ends && ends->rows() == 0;
     if (remembers)
@@ -31,11 +31,8 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
         std::vector<uint32_t> terms;
         RowEnds own_ends;
         std::vector<RowEnds> all_ends;
-        FinalGatherOptions options = everywhere;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
-            // From where no ray of the series met a door, none that aims at it would bring much.
-            options.aim_at = series.doors_seen.row(i);
             series.activeTerms(i, terms);
             std::erase_if(terms, [&](uint32_t t) { return !groups[gatherer.paths().terms()[t].group]; });
             row.clear();

@@ -14,9 +14,10 @@ namespace {
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
 
-// Between two doors' leaves, before they count as out of sight of each other; and how far off the leaves they start.
+// Between two doors' leaves, before they count as out of sight of each other; and how far from the leaves' surface
+// towards the middle they start.
 constexpr uint32_t sight_rays = 256;
-constexpr float sight_lift_m = 0.01f;
+constexpr float inwards = 0.1f;
 
 BakeSettings few(BakeSettings settings, size_t texels) {
     const size_t rays = std::clamp(measuring_rays / texels, texel_rays_min, texel_rays_max);
@@ -53,27 +54,45 @@ std::vector<uint32_t> doorsOf(const Term& term) {
     return doors;
 }
 
-// Leaves where they stand closed, and open.
+// Points within doors' leaves, where these stand closed and open.
 class LeafPoints {
    public:
-    explicit LeafPoints(const RayScene& rays) : rays_(rays), triangles_(rays.scene().doors.size()) {
-        for (uint32_t t = 0; t < rays.triangles().size(); ++t)
-            if (const uint32_t c = rays.triangles()[t].condition; c != no_condition) triangles_[c / 2].push_back(t);
+    explicit LeafPoints(const RayScene& rays) : rays_(rays), doors_(rays.scene().doors.size()) {
+        for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+            const LevelTriangle& triangle = rays.triangles()[t];
+            if (triangle.condition == no_condition) continue;
+            const SceneMesh& mesh = rays.scene().meshes[triangle.mesh];
+            glm::vec3 low = mesh.positions_m[0], high = low;
+            for (const glm::vec3 p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+            const glm::vec3 a = rays.corner(t, 0);
+            Door& door = doors_[triangle.condition / 2];
+            door.area_m2 += 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
+            door.leaves.push_back({t, 0.5f * (low + high), door.area_m2});
+        }
     }
-    // The i-th of many beside the door's leaves, on either side.
-    std::optional<glm::vec3> point(uint32_t door, uint32_t i) const {
-        const auto& triangles = triangles_[door];
-        if (triangles.empty()) return std::nullopt;
-        const uint32_t triangle = triangles[hash(i, door) % triangles.size()];
-        glm::vec2 at = sequence2d(i, door);
-        if (at.x + at.y > 1) at = 1.0f - at;
-        const float side = hash(i) & 1 ? sight_lift_m : -sight_lift_m;
-        return rays_.pointOn(triangle, at.x, at.y) + side * rays_.triangles()[triangle].normal;
+    // The i-th of many, evenly over the leaves' surface and a little inwards: an edge may lie within a wall, or outside
+    // of the level.
+    std::optional<glm::vec3> point(uint32_t number, uint32_t i) const {
+        const Door& door = doors_[number];
+        const glm::vec3 u = sequence3d(i, number);
+        const auto at = std::ranges::upper_bound(door.leaves, u.z * door.area_m2, {}, &Part::area_up_to_m2);
+        if (at == door.leaves.end()) return std::nullopt;
+        const glm::vec2 within = u.x + u.y > 1 ? glm::vec2(1 - u.x, 1 - u.y) : glm::vec2(u);
+        return glm::mix(rays_.pointOn(at->triangle, within.x, within.y), at->centre, inwards);
     }
 
    private:
+    struct Part {
+        uint32_t triangle;
+        glm::vec3 centre;     // of the leaf that it is of
+        float area_up_to_m2;  // of the door's triangles until this one
+    };
+    struct Door {
+        std::vector<Part> leaves;
+        float area_m2 = 0;
+    };
     const RayScene& rays_;
-    std::vector<std::vector<uint32_t>> triangles_;  // per door
+    std::vector<Door> doors_;
 };
 
 }  // namespace

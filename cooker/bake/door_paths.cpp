@@ -58,6 +58,7 @@ std::vector<std::set<Conditions>> keptPaths(const Scene& scene, std::span<const 
 // What a path is taken for where it is not kept: doors that no combination names together are baked each with the
 // others closed, so that they have to be need not be said. That one has to be open cannot be left out.
 std::optional<Conditions> nearestKept(const Conditions& path, const auto& kept) {
+    if (kept.contains(path)) return path;
     for (std::set<Conditions> tried = {path}; !tried.empty();) {
         std::set<Conditions> shorter;
         for (const Conditions& c : tried) {

@@ -56,8 +56,10 @@ enum class Leaf {
 // Kept: every term with at most one door, those of two doors that both have to be closed, where these see each other,
 // and what `dimmer_combinations` names with all of its parts. A combination with a light set keeps that set's terms
 // alone, one without keeps every group's. Light that needs more doors than are kept together goes to the term without
-// some that it needs closed: states with no door open, and with one, have it. Immutable; look-ups in tables of paths^2
-// and paths * groups numbers.
+// some that it needs closed: states with no door open, and with one, have it. (It stays when such a door opens: light
+// off three closed doors, or off two that do not see each other, is a little too much where the one left out is open.
+// Which one that is depends on what any combination names.) Immutable; look-ups in tables of paths^2 and paths * groups
+// numbers.
 class DoorPaths {
    public:
     // `closed_together`: see doorsInSight() (bake/door_pairs.h).
@@ -83,7 +85,7 @@ class DoorPaths {
         if (own == (condition ^ 1) || needs(path, condition ^ 1)) return Leaf::Absent;
         return Leaf::Either;
     }
-    // no_term where it is not kept.
+    // Or the one kept instead; no_term where there is none.
     uint32_t term(uint32_t group, uint32_t path) const {
         return path == no_path ? no_term : term_of_[path * group_count_ + group];
     }

@@ -8,8 +8,9 @@
 namespace dimmer::cook {
 
 // visit(share, path) for every way that light has from `origin` along `direction` over `distance_m`: the share of it
-// that passes, 0 to 1, while the doors stand as the path needs them. Ways that no kept path has are left out. `own`:
-// the condition under which the receiver is there; `ignored`: a model that is not.
+// that passes, 0 to 1, while the doors stand as the path needs them. Ways of paths that are not kept count for those
+// kept instead, or are left out (DoorPaths::with). `own`: the condition under which the receiver is there; `ignored`: a
+// model that is not.
 void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, uint32_t ignored, glm::vec3 origin,
                 glm::vec3 direction, float distance_m, auto&& visit) {
     const float passed = rays.transmittance(origin, direction, distance_m, Surfaces::Walls, ignored);
@@ -34,6 +35,7 @@ void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, uint
             if (leaf == Leaf::Either && stopped > 0) {
                 // What the leaf would stop goes through where it stands otherwise.
                 const Way through{way.share * stopped, paths.with(way.path, condition ^ 1)};
+                if (through.path == way.path) continue;  // nobody asks how this door stands: both ways are one
                 if (stopped >= 1)
                     way = through;
                 else if (through.path != no_path && count < ways_max)

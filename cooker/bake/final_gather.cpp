@@ -57,8 +57,7 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
     wanted_in_aim_.clear();
     for (uint32_t t : terms) {
         aim_of_term_[t] = 0;
-        if (options.aim_at && !std::ranges::binary_search(*options.aim_at, gatherer_.paths().onlyDoor(t))) continue;
-        const uint32_t guide = gatherer_.guideOf(t);
+        const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
         if (guide == no_guide) continue;
         const auto known = std::ranges::find(aims_, guide, &DoorAim::guide) - aims_.begin();
         if (static_cast<size_t>(known) == aims_.size()) aims_.push_back(gatherer_.aimAt(from, guide));

@@ -4,7 +4,6 @@
 #include <bake/bake.h>
 #include <bake/series.h>
 
-#include <optional>
 #include <span>
 
 namespace dimmer::cook {
@@ -14,8 +13,7 @@ struct FinalGatherOptions {
     uint32_t emitter_samples = 8;  // per round of rays
     float noise_max = 0;           // 95 % interval, relative to irradiance + floor; 0: always rays_max
     uint32_t seed = 0;
-    // The doors, ascending, at which rays aim besides, for terms about them; without it, at all of the terms' doors.
-    std::optional<std::span<const uint32_t>> aim_at = {};
+    bool aim_at_doors = true;          // rays towards the doors of the terms besides; off, for measuring against
     std::span<const float> floor_lux;  // per term: light below this need not be exact to a share of itself
 };
 

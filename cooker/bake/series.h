@@ -34,7 +34,8 @@ struct Series {
     void activeTerms(size_t receiver, std::vector<uint32_t>& terms) const;
 };
 
-// Deterministic for any number of threads, and each light group's part is the same whichever others there are.
+// Deterministic for any number of threads, and each light group's part is the same whichever others there are
+// (combinations of doors, though, are the level's: see DoorPaths).
 // Memory while it runs: series_rays receivers' numbers per texel, 2 to 3 bytes each. `groups`: per light group, whether
 // to follow its light; empty: all. `links`: where the rays end, where that is known, to be filled in where it is empty;
 // at least series_rays each.

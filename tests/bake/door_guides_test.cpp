@@ -75,7 +75,6 @@ TEST(DoorGuides, AreUnbiasedAndLessNoisyAtEqualRays) {
         if (!(glm::dot(glm::vec3(0, -0.5f, 0) - b.place(i), b.normal(i)) > 0.1f)) continue;
         ++receivers;
         double here[2];
-        constexpr uint32_t door[] = {0};
         for (const bool aim : {false, true}) {
             double sum = 0, squares = 0;
             for (uint32_t seed = 0; seed < seeds; ++seed) {
@@ -84,7 +83,7 @@ TEST(DoorGuides, AreUnbiasedAndLessNoisyAtEqualRays) {
                               {.rays_max = (aim ? aimed_rounds : 9) * rays_per_round,
                                .emitter_samples = 0,
                                .seed = 1000 + seed,
-                               .aim_at = std::span<const uint32_t>(door, aim ? 1 : 0),
+                               .aim_at_doors = aim,
                                .floor_lux = floors},
                               row);
                 const auto lux = static_cast<double>(luminance(row[0].light.irradiance_lux));
