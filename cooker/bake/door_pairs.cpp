@@ -58,16 +58,16 @@ std::vector<uint32_t> doorsOf(const Term& term) {
 class LeafPoints {
    public:
     explicit LeafPoints(const RayScene& rays) : rays_(rays), doors_(rays.scene().doors.size()) {
+        std::vector<std::optional<glm::vec3>> centres(rays.scene().meshes.size());
         for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
             const LevelTriangle& triangle = rays.triangles()[t];
             if (triangle.condition == no_condition) continue;
-            const SceneMesh& mesh = rays.scene().meshes[triangle.mesh];
-            glm::vec3 low = mesh.positions_m[0], high = low;
-            for (const glm::vec3 p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+            auto& centre = centres[triangle.mesh];
+            if (!centre) centre = middleOf(rays.scene().meshes[triangle.mesh]);
             const glm::vec3 a = rays.corner(t, 0);
             Door& door = doors_[triangle.condition / 2];
             door.area_m2 += 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
-            door.leaves.push_back({t, 0.5f * (low + high), door.area_m2});
+            door.leaves.push_back({t, *centre, door.area_m2});
         }
     }
     // The i-th of many, evenly over the leaves' surface and a little inwards: an edge may lie within a wall, or outside
@@ -91,6 +91,12 @@ class LeafPoints {
         std::vector<Part> leaves;
         float area_m2 = 0;
     };
+    static glm::vec3 middleOf(const SceneMesh& mesh) {
+        glm::vec3 low = mesh.positions_m[0], high = low;
+        for (const glm::vec3 p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+        return 0.5f * (low + high);
+    }
+
     const RayScene& rays_;
     std::vector<Door> doors_;
 };
