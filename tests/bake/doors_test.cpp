@@ -94,6 +94,15 @@ TEST(DoorPaths, DoorsAreBakedEachWithTheOthersClosed) {
         EXPECT_EQ(paths.moved(off_b, over(a_open), no_condition), paths.term(1, over(a_open)));
         EXPECT_EQ(paths.leaving(paths.term(1, over(a_open)), c_closed), paths.term(1, over(a_open)));
     }
+    {
+        const std::vector<DoorIndices> in_sight = {{1, 2}};
+        const DoorPaths paths(scene, in_sight);
+        EXPECT_EQ(paths.termCount(), 2u * (1 + 2 * 3 + 1));
+        const uint32_t b = paths.with(free_path, b_closed), both = paths.with(b, c_closed);
+        EXPECT_NE(both, b);
+        EXPECT_EQ(paths.with(both, b_open), no_path);
+        EXPECT_EQ(paths.with(both, a_open), paths.with(free_path, a_open));
+    }
     scene.combinations = {{{true, 0}, {true, 1}, {false, 0}}};  // for the set's light alone
     const DoorPaths paths(scene);
     const uint32_t a = paths.with(free_path, a_open), ab = paths.with(a, b_closed);
@@ -130,6 +139,28 @@ TEST(DoorRays, PartAtLeavesThatLetSomeLightThrough) {
     const DoorPaths both(scene);
     const uint32_t wood_first = both.with(free_path, 3);
     EXPECT_EQ(ways(both, 3), (std::map<uint32_t, float>{{wood_first, 0.75f}, {both.with(wood_first, 1), 0.25f}}));
+}
+
+// Behind an open door another one is taken to be closed: what of it stands there open is not there, however often a way
+// passes it.
+TEST(DoorRays, DoNotPartAtWhatOpenLeavesOfOtherDoorsLetThrough) {
+    Scene scene;
+    Material glass = lambert(0.5f);
+    glass.alpha_mode = AlphaMode::Blend;
+    glass.alpha = 0.25f;
+    const uint32_t pane = addMaterial(scene, glass), wood = addMaterial(scene, lambert(0.5f));
+    scene.doors.resize(2);
+    addQuad(scene, "wood", {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, wood).door = 0;
+    for (int i = 0; i < 8; ++i) {
+        SceneMesh& open = addQuad(scene, "pane", {2 + 0.1f * static_cast<float>(i), 0, 0}, {0, 1, 0}, {0, 0, 1}, pane);
+        open.door = 1;
+        open.is_open_leaf = true;
+    }
+    const DoorPaths paths(scene);
+    std::map<uint32_t, float> found;
+    forEachWay(RayScene(scene), paths, no_condition, no_model, {0, 0.1f, 0.2f}, {1, 0, 0}, 3,
+               [&](float share, uint32_t path) { found[path] += share; });
+    EXPECT_EQ(found, (std::map<uint32_t, float>{{paths.with(free_path, 1), 1}}));
 }
 
 // The light of a state: terms weighted by what they need. Bit d of `open`: door d; bit s of `sets`: set s.
