@@ -18,7 +18,8 @@ struct GuideBox {
     float flux = 0;
 };
 
-inline constexpr uint32_t patch_boxes_max = 12;
+// With the door's own box a whole register of eight: more made no light less noisy.
+inline constexpr uint32_t patch_boxes_max = 7;
 
 inline constexpr uint32_t no_guide = UINT32_MAX;
 
@@ -55,7 +56,7 @@ class Guide {
     float pdf(glm::vec3 direction) const;
 
    private:
-    static constexpr size_t most = (patch_boxes_max + 1 + 7) / 8 * 8;  // whole registers
+    static constexpr size_t most = (patch_boxes_max + 1 + 7) / 8 * 8;
     using PerTarget = std::array<float, most>;
 
     // Of every box: its corners, from the point; its chance; by axis, the chance within the box of the side across it,

@@ -13,6 +13,8 @@ namespace {
 // The flux over a whole level is measured: so many rays in all, within limits per texel.
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
+// Of two fluxes only the ratio counts: what the last bounces bring goes to both.
+constexpr float measured_tail_max = 0.02f;
 
 // Between two doors' leaves, before they count as out of sight of each other; and how far from the leaves' surface
 // towards the middle they start.
@@ -23,6 +25,7 @@ BakeSettings few(BakeSettings settings, size_t texels) {
     const size_t rays = std::clamp(measuring_rays / texels, texel_rays_min, texel_rays_max);
     settings.series_rays = std::min(settings.series_rays, static_cast<uint32_t>(rays));
     settings.emitter_samples = 1;
+    settings.tail_max = std::max(settings.tail_max, measured_tail_max);
     return settings;
 }
 

@@ -13,9 +13,11 @@ namespace dimmer::cook {
 // model that is not.
 void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, uint32_t ignored, glm::vec3 origin,
                 glm::vec3 direction, float distance_m, auto&& visit) {
-    const float passed = rays.transmittance(origin, direction, distance_m, Surfaces::Walls, ignored);
+    LeafHits leaves;
+    const float passed =
+        rays.transmittance(origin, direction, distance_m, Surfaces::Walls, ignored, rays.anyLeaf() ? &leaves : nullptr);
     if (!(passed > 0)) return;
-    if (!rays.anyLeaf()) return visit(passed, free_path);
+    if (leaves.count == 0) return visit(passed, free_path);
     struct Way {
         float share;
         uint32_t path;
@@ -24,7 +26,7 @@ void forEachWay(const RayScene& rays, const DoorPaths& paths, uint32_t own, uint
     std::array<Way, ways_max> ways;
     ways[0] = {passed, free_path};
     uint32_t count = 1;
-    for (const Hit& hit : rays.leavesAlong(origin, direction, distance_m)) {
+    for (const Hit& hit : leaves) {
         const uint32_t condition = rays.triangles()[hit.triangle].condition;
         const float stopped = rays.alphaAt(hit.triangle, hit.u, hit.v);
         const uint32_t before = count;

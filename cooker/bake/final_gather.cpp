@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 namespace dimmer::cook {
@@ -11,6 +12,9 @@ namespace {
 // Fewer rounds say too little about their spread to stop on it.
 constexpr uint32_t rounds_min = 4;
 constexpr float normal_95 = 1.96f;
+// Rays are aimed for a term while without them, by what they found, its rounds would differ by more than this many
+// times their variance more: where a light comes from all around, or the door is out of sight, they gain nothing.
+constexpr float aim_gain_min = 2;
 // Light below this share of its term's mean need not be exact to a share of itself: the error metric's own floor.
 constexpr float noise_floor = 0.01f;
 // Terms with doors are many and faint, and would keep rays going for the others: they need not be exact to a share of
@@ -57,6 +61,7 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
     wanted_in_aim_.clear();
     for (uint32_t t : terms) {
         aim_of_term_[t] = 0;
+        spared_variance_[t] = 0;
         const uint32_t guide = options.aim_at_doors ? gatherer_.guideOf(t) : no_guide;
         if (guide == no_guide) continue;
         const auto known = std::ranges::find(aims_, guide, &DoorAim::guide) - aims_.begin();
@@ -65,6 +70,20 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
         wanted_in_aim_.resize(aims_.size());
         ++wanted_in_aim_[static_cast<size_t>(known)];
     }
+}
+
+// By past rounds alone, so that no round's own luck decides what it counts for.
+template <class Light>
+bool FinalGather<Light>::aimPays(uint32_t term) const {
+    const State& s = state_[term];
+    const auto rounds = static_cast<float>(s.rounds);
+    return spared_variance_[term] / rounds > aim_gain_min * s.squares / (rounds - 1);
+}
+
+template <class Light>
+void FinalGather<Light>::leaveAim(uint32_t term) {
+    --wanted_in_aim_[aim_of_term_[term] - 1u];
+    aim_of_term_[term] = 0;
 }
 
 template <class Light>
@@ -102,7 +121,7 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
                           .first_ray = r * rays_per_round,
                           .wanted_in_group = wanted_in_group_,
                           .row = endsOfRound(ends, r)},
-                         &outgoing, round_, nullptr, {aims_, aim_of_term_, wanted_in_aim_});
+                         &outgoing, round_, nullptr, {aims_, aim_of_term_, wanted_in_aim_, spared_variance_});
         const auto idle = static_cast<size_t>(std::ranges::count(wanted_in_aim_, 0u));
         traced += (known ? 0 : rays_per_round) + (aims_.size() - idle) * aimed_rays;
         for (uint32_t t : terms) {
@@ -112,9 +131,10 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
             const float interval = normal_95 * std::sqrt(s.varianceOfMean());
             s.done = r + 1 >= rounds_min && options.noise_max > 0 &&
                      interval <= options.noise_max * (s.mean + options.floor_lux[t]);
+            const bool aimed = aim_of_term_[t] != 0, look = r + 1 >= rounds_min && std::has_single_bit(r + 1);
+            if (aimed && (s.done || (look && !aimPays(t)))) leaveAim(t);
             if (!s.done) continue;
             want(t, false);
-            if (aim_of_term_[t] != 0) --wanted_in_aim_[aim_of_term_[t] - 1u];
             --waiting;
         }
         round_.clear();

@@ -33,6 +33,7 @@ class FinalGather {
           round_(gatherer.paths().termCount()),
           state_(gatherer.paths().termCount()),
           aim_of_term_(gatherer.paths().termCount()),
+          spared_variance_(gatherer.paths().termCount()),
           wanted_in_group_(gatherer.paths().groupCount()) {
         round_.wantNone();
     }
@@ -55,6 +56,8 @@ class FinalGather {
     };
     void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
     void want(uint32_t term, bool wanted);
+    bool aimPays(uint32_t term) const;
+    void leaveAim(uint32_t term);
     static RowEnds* endsOfRound(RowEnds* row, uint32_t round);
 
     const Gatherer& gatherer_;
@@ -62,7 +65,8 @@ class FinalGather {
     std::vector<uint32_t> wanted_in_aim_;  // terms that are not done
     TermAccumulator<Light> round_;         // wants the terms that are not done
     std::vector<State> state_;
-    std::vector<uint16_t> aim_of_term_;  // of the terms that are asked for
+    std::vector<uint16_t> aim_of_term_;   // of the terms that are asked for
+    std::vector<float> spared_variance_;  // per term; see DoorAims
     std::vector<uint32_t> wanted_in_group_;
 };
 

@@ -218,11 +218,13 @@ bool Gatherer::brings(std::span<const PathEnd> ends, const GatherFrom& from, con
 // leaves: else such a ray ends nowhere that could be told.
 template <class Light>
 uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed, std::vector<PathEnd>* through) const {
-    if (ray.forDoors() && rays_.leavesAlong(ray.origin, ray.world, far_away_m).count == 0) return RayEnd::again;
-    const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored);
+    if (ray.forDoors() && !rays_.mayMeetLeaf(ray.origin, ray.world)) return RayEnd::again;
+    LeafHits leaves;
+    const auto hit = rays_.nearest(ray.origin, ray.world, far_away_m, seed, Surfaces::Walls, ray.from.ignored,
+                                   rays_.anyLeaf() ? &leaves : nullptr);
     const size_t first = through ? through->size() : 0;
     LeavesMet met{.through = through};
-    const uint32_t path = rays_.anyLeaf() ? throughLeaves(ray, hit ? hit->distance_m : far_away_m, met) : free_path;
+    const uint32_t path = throughLeaves(ray, leaves, met);
     uint32_t end = RayEnd::nothing;
     bool shines = met.shines;
     if (path == no_path || (path == free_path && ray.forDoors())) {
@@ -245,25 +247,31 @@ uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed, std::vector<Path
     return RayEnd::through;
 }
 
-// From the radiance at a ray's end to its share of the irradiance in a term: by the densities of all rays that might
-// have found it there.
+// From the radiance at a ray's end to its share of the irradiance in an aim's terms: by the densities of all rays that
+// might have found it there.
 template <class Light>
-float Gatherer::shareOf(const Ray<Light>& ray, uint32_t path, uint32_t term) const {
-    const float alone = ray.alone(path);
-    if (ray.aims.all.empty()) return alone;
-    const uint32_t aim = ray.aims.of_term[term];
-    if (ray.aim != 0 && ray.aim != aim) return 0;
-    if (aim == 0) return alone;
-    const uint32_t index = aim - 1;
-    const uint32_t bit = index < ray.shares.of_aim.size() ? 1u << index : 0;
-    if (ray.shares.asked & bit) return ray.shares.of_aim[index];
-    const Guide& guide = ray.aims.all[index].from_point[ray.point];
-    if (guide.empty()) return alone;
-    const float by_aim = static_cast<float>(aimed_rays) * guide.pdf(ray.world);
+float Gatherer::shareOf(const Ray<Light>& ray, uint32_t path, uint32_t aim) const {
+    const uint32_t bit = aim < ray.shares.of_aim.size() ? 1u << aim : 0;
+    if (ray.shares.asked & bit) return ray.shares.of_aim[aim];
+    const Guide& guide = ray.aims.all[aim].from_point[ray.point];
+    const float by_aim = guide.empty() ? 0 : static_cast<float>(aimed_rays) * guide.pdf(ray.world);
     const float share = Light::Intake::weight(ray.tangent) / (ray.density(path) + by_aim);
-    if (bit) ray.shares.of_aim[index] = share;
+    if (bit) ray.shares.of_aim[aim] = share;
     ray.shares.asked |= bit;
     return share;
+}
+
+// Adds radiance at a ray's end to a term that has `aim`, counted as in DoorAims::of_term.
+template <class Light>
+void Gatherer::add(const Ray<Light>& ray, uint32_t path, uint32_t term, glm::vec3 radiance, uint32_t aim) const {
+    if (ray.aim != 0 && ray.aim != aim) return;
+    const float alone = ray.alone(path), share = aim != 0 ? shareOf(ray, path, aim - 1) : alone;
+    const glm::vec3 lux = radiance * share;
+    ray.sum[term].add(lux, ray.weights);
+    if (ray.aim == 0 || ray.aims.spared_variance.empty()) return;
+    // A ray that brings x, found `alone / share` times as rarely, brings as much more: E[x^2] grows by that.
+    const float x = luminance(lux) * Light::irradiance_per_lux;
+    ray.aims.spared_variance[term] += x * x * (alone / share - 1);
 }
 
 template <class Light>
@@ -272,21 +280,21 @@ void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
     if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
     // An image sky has rays of its own; see sampleSky.
     if (ray.aim && !sky_.empty()) return;
-    const float share = sky_.empty() ? shareOf(ray, path, term) : ray.alone(path);
-    if (share > 0) ray.sum[term].add(missed(ray.options, ray.world, ray.density(path)) * share, ray.weights);
+    const uint32_t aim = sky_.empty() && !ray.aims.all.empty() ? ray.aims.of_term[term] : 0;
+    add(ray, path, term, missed(ray.options, ray.world, ray.density(path)), aim);
 }
 
 // Takes what the leaves along a ray send back, and says whether there are any. Returns the path on which it goes on
 // behind them.
 template <class Light>
-uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, float distance_m, LeavesMet& met) const {
+uint32_t Gatherer::throughLeaves(const Ray<Light>& ray, const LeafHits& leaves, LeavesMet& met) const {
     uint32_t path = free_path;
     const auto takeLeaf = [&](const Hit& hit, uint32_t over) {
         const uint32_t found = take(ray, hit, over);
         met.shines = met.shines || emitters_.emitterOf(hit.triangle);
         if (met.through && found != no_index) met.through->push_back({over, found});
     };
-    for (const Hit& hit : rays_.leavesAlong(ray.origin, ray.world, distance_m)) {
+    for (const Hit& hit : leaves) {
         met.any = true;
         const uint32_t condition = rays_.triangles()[hit.triangle].condition;
         const Leaf leaf = paths_.leaf(path, ray.from.condition, condition);
@@ -344,8 +352,10 @@ void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path)
     for (const TermLight& light : ray.outgoing->row(receiver)) {
         const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (term == no_term || !ray.sum.wants(term)) continue;
-        if (const float share = any_aim ? shareOf(ray, path, term) : alone; share > 0)
-            ray.sum[term].add(light.value * share, ray.weights);
+        if (any_aim)
+            add(ray, path, term, light.value, ray.aims.of_term[term]);
+        else
+            ray.sum[term].add(light.value * alone, ray.weights);
     }
 }
 

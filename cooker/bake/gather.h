@@ -42,6 +42,8 @@ struct ProbeIntake {
 // Light of one term at one receiver.
 struct Gathered {
     using Intake = SurfaceIntake;
+    // Of irradiance() per what add() is given.
+    static constexpr float irradiance_per_lux = 1;
     glm::vec3 irradiance_lux{0};
     // Luminance of the irradiance on normals tilted towards +tangent, +bitangent, -tangent and -bitangent: how
     // irradiance falls off. Light from below the surface is left out. Adds up over contributions.
@@ -68,6 +70,7 @@ struct Gathered {
 // cd/m2.
 struct ProbeLight {
     using Intake = ProbeIntake;
+    static constexpr float irradiance_per_lux = 0.25f;  // a sphere's surface, and its cross-section
     std::array<glm::vec3, 9> radiance{};
 
     // Of light from one direction: the harmonics, once for each channel of `radiance`.
@@ -120,6 +123,9 @@ struct DoorAims {
     std::span<const DoorAim> all = {};
     std::span<const uint16_t> of_term = {};
     std::span<const uint32_t> wanted = {};
+    // Per term, added to: by how much the light that aimed rays find would spread a gather's sum more if only rays by
+    // the intake looked for it (variance of the luminance of irradiance, lux^2). Null: nobody asks.
+    std::span<float> spared_variance = {};
 };
 
 // The face of points that lie on none: probes.
@@ -221,7 +227,7 @@ class Gatherer {
     template <class Light>
     struct Ray;
     template <class Light>
-    uint32_t throughLeaves(const Ray<Light>& ray, float distance_m, LeavesMet& met) const;
+    uint32_t throughLeaves(const Ray<Light>& ray, const LeafHits& leaves, LeavesMet& met) const;
     template <class Light>
     uint32_t take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const;
     template <class Light>
@@ -237,7 +243,9 @@ class Gatherer {
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                      TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim) const;
     template <class Light>
-    float shareOf(const Ray<Light>& ray, uint32_t path, uint32_t term) const;
+    float shareOf(const Ray<Light>& ray, uint32_t path, uint32_t aim) const;
+    template <class Light>
+    void add(const Ray<Light>& ray, uint32_t path, uint32_t term, glm::vec3 radiance, uint32_t aim) const;
     uint32_t onto(uint32_t path, uint32_t own, uint32_t target) const;
     glm::vec3 missed(const GatherOptions& options, glm::vec3 world, float density) const;
     template <class Light>

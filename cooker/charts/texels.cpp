@@ -147,11 +147,12 @@ class TexelSampler {
 
     // Without the leaves of doors, but for one that the triangle itself is of.
     std::optional<Hit> nearestWithout(uint32_t triangle, glm::vec3 position, glm::vec3 direction) const {
-        const auto wall = rays_.nearest(position, direction, far_away_m, 0, Surfaces::Walls);
         const uint32_t own = rays_.triangles()[triangle].condition;
-        if (own != no_condition)
-            for (const Hit& hit : rays_.leavesAlong(position, direction, wall ? wall->distance_m : far_away_m))
-                if (rays_.triangles()[hit.triangle].condition == own) return hit;
+        LeafHits leaves;
+        const auto wall = rays_.nearest(position, direction, far_away_m, 0, Surfaces::Walls, no_model,
+                                        own != no_condition ? &leaves : nullptr);
+        for (const Hit& hit : leaves)
+            if (rays_.triangles()[hit.triangle].condition == own) return hit;
         return wall;
     }
 

@@ -228,10 +228,10 @@ std::vector<glm::vec3> tiltedNormals(uint32_t point) {
 
 // With every door closed.
 std::optional<Hit> nearestClosed(const RayScene& rays, glm::vec3 origin, glm::vec3 direction, uint32_t seed) {
-    constexpr float far_m = 1e30f;
-    auto hit = rays.nearest(origin, direction, far_m, seed, Surfaces::Walls);
-    if (!rays.anyLeaf()) return hit;
-    for (const Hit& leaf : rays.leavesAlong(origin, direction, hit ? hit->distance_m : far_m)) {
+    LeafHits leaves;
+    const auto hit = rays.nearest(origin, direction, far_away_m, seed, Surfaces::Walls, no_model,
+                                  rays.anyLeaf() ? &leaves : nullptr);
+    for (const Hit& leaf : leaves) {
         const bool there = rays.triangles()[leaf.triangle].condition % 2 == 0;
         if (there && unitFloat(hash(seed, leaf.triangle)) < rays.alphaAt(leaf.triangle, leaf.u, leaf.v)) return leaf;
     }

@@ -11,36 +11,56 @@
 namespace dimmer::cook {
 namespace {
 
-// Embree ray masks: what must be asked for its alpha is a geometry of its own, so that opaque rays skip it.
-constexpr unsigned mask_opaque = 1, mask_transparent = 2;
+// Kinds of surfaces are geometries of their own: what must be asked for its alpha, so that opaque rays skip it, and
+// leaves among walls, which collect rays and stop none. Kind k has Embree's ray mask 1 << k.
+enum Kind : unsigned { opaque, transparent, opaque_leaf, transparent_leaf, kinds };
+constexpr unsigned mask_opaque = 1 << opaque, mask_transparent = 1 << transparent;
+constexpr unsigned mask_leaves = 1 << opaque_leaf | 1 << transparent_leaf;
 // After passing a transparent surface a ray starts anew this far behind it.
 constexpr float step_past_m = 1e-4f;
 // A ray that passes more surfaces than this is taken to be stopped; real levels stack a handful.
 constexpr int transparent_layers_max = 64;
+
+// What a ray carries along: where it leaves the leaves that it meets.
+struct Collector {
+    RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
+    LeafHits* leaves;             // not null for rays that meet leaves
+
+    explicit Collector(LeafHits* into) : leaves(into) { rtcInitIntersectContext(&context); }
+};
+
+void collect(const RTCFilterFunctionNArguments* args) {
+    LeafHits& leaves = *reinterpret_cast<Collector*>(args->context)->leaves;
+    const auto* ray = reinterpret_cast<const RTCRay*>(args->ray);
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+    args->valid[0] = 0;  // go on
+    if (leaves.count == LeafHits::max) return;
+    const uint32_t triangle = static_cast<const uint32_t*>(args->geometryUserPtr)[hit->primID];
+    // A triangle may be split among Embree's nodes, and be met in each.
+    if (std::ranges::find(leaves, triangle, &Hit::triangle) != leaves.end()) return;
+    leaves.hits[leaves.count++] = {triangle, ray->tfar, hit->u, hit->v, false};
+}
 
 }  // namespace
 
 struct RayScene::Embree {
     RTCDevice device = rtcNewDevice(nullptr);
     RTCScene scene = rtcNewScene(device);
-    std::vector<uint32_t> triangle_of[2];  // Embree primitive -> level triangle; opaque, transparent
+    std::array<std::vector<uint32_t>, kinds> triangle_of;  // Embree primitive -> level triangle
 
     Embree(const RayScene& level, Surfaces surfaces) {
         for (uint32_t t = 0; t < level.triangles().size(); ++t) {
             const LevelTriangle& triangle = level.triangles()[t];
-            const bool leaf = triangle.condition != no_condition;
-            if (surfaces != Surfaces::All && leaf != (surfaces == Surfaces::Leaves)) continue;
-            const bool transparent = level.scene().materials[triangle.material].alpha_mode != AlphaMode::Opaque;
-            triangle_of[transparent].push_back(t);
+            const bool is_transparent = level.scene().materials[triangle.material].alpha_mode != AlphaMode::Opaque;
+            const bool collects = surfaces == Surfaces::Walls && triangle.condition != no_condition;
+            triangle_of[collects ? (is_transparent ? transparent_leaf : opaque_leaf)
+                                 : (is_transparent ? transparent : opaque)]
+                .push_back(t);
         }
-        attach(0, level);
-        attach(1, level);
+        for (unsigned kind = 0; kind < kinds; ++kind) attach(kind, level);
         // Robust: rays must not slip through the edges that closed rooms are made of.
-        const bool collects = surfaces == Surfaces::Leaves;
-        rtcSetSceneFlags(
-            scene, collects ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : RTC_SCENE_FLAG_ROBUST);
-        // High quality splits triangles, and a split one would be collected twice.
-        rtcSetSceneBuildQuality(scene, collects ? RTC_BUILD_QUALITY_MEDIUM : RTC_BUILD_QUALITY_HIGH);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
         rtcCommitScene(scene);
     }
     ~Embree() {
@@ -50,10 +70,10 @@ struct RayScene::Embree {
     Embree(const Embree&) = delete;
     Embree& operator=(const Embree&) = delete;
 
-    bool anyTransparent() const { return !triangle_of[1].empty(); }
+    bool anyTransparent() const { return !triangle_of[transparent].empty(); }
 
-    void attach(unsigned geometry_id, const RayScene& level) {
-        const auto& list = triangle_of[geometry_id];
+    void attach(unsigned kind, const RayScene& level) {
+        const auto& list = triangle_of[kind];
         if (list.empty()) return;
         RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
         auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
@@ -69,9 +89,14 @@ struct RayScene::Embree {
                 positions[vertex * 3 + 2] = p.z;
                 indices[vertex] = static_cast<unsigned>(vertex);
             }
-        rtcSetGeometryMask(geometry, geometry_id == 0 ? mask_opaque : mask_transparent);
+        rtcSetGeometryMask(geometry, 1u << kind);
+        if ((mask_leaves >> kind & 1) != 0) {
+            rtcSetGeometryUserData(geometry, const_cast<uint32_t*>(list.data()));
+            rtcSetGeometryIntersectFilterFunction(geometry, collect);
+            rtcSetGeometryOccludedFilterFunction(geometry, collect);
+        }
         rtcCommitGeometry(geometry);
-        rtcAttachGeometryByID(scene, geometry, geometry_id);
+        rtcAttachGeometryByID(scene, geometry, kind);
         rtcReleaseGeometry(geometry);
     }
 
@@ -92,16 +117,15 @@ struct RayScene::Embree {
         ray_hit.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     }
 
-    bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m,
-                   unsigned mask) const {
-        prepare(ray_hit, origin, direction, near_m, far_m, mask);
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        rtcIntersect1(scene, &context, &ray_hit);
+    bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m, unsigned mask,
+                   LeafHits* leaves = nullptr) const {
+        prepare(ray_hit, origin, direction, near_m, far_m, leaves ? mask | mask_leaves : mask);
+        Collector collector(leaves);
+        rtcIntersect1(scene, &collector.context, &ray_hit);
         return ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     }
 
-    bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask) const {
+    bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask, LeafHits* leaves = nullptr) const {
         RTCRay ray{.org_x = origin.x,
                    .org_y = origin.y,
                    .org_z = origin.z,
@@ -111,36 +135,14 @@ struct RayScene::Embree {
                    .dir_z = direction.z,
                    .time = 0,
                    .tfar = far_m,
-                   .mask = mask,
+                   .mask = leaves ? mask | mask_leaves : mask,
                    .id = 0,
                    .flags = 0};
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        rtcOccluded1(scene, &context, &ray);
+        Collector collector(leaves);
+        rtcOccluded1(scene, &collector.context, &ray);
         return ray.tfar < 0;
     }
 };
-
-namespace {
-
-// Collects every hit of a ray instead of the nearest.
-struct Collector {
-    RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
-    LeafHits& hits;
-    const std::vector<uint32_t>* triangle_of;
-};
-
-void collect(const RTCFilterFunctionNArguments* args) {
-    auto& into = *reinterpret_cast<Collector*>(args->context);
-    const auto* ray = reinterpret_cast<const RTCRay*>(args->ray);
-    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
-    args->valid[0] = 0;  // go on
-    if (into.hits.count == LeafHits::max) return;
-    const uint32_t triangle = into.triangle_of[hit->geomID][hit->primID];
-    into.hits.hits[into.hits.count++] = {triangle, ray->tfar, hit->u, hit->v, false};
-}
-
-}  // namespace
 
 RayScene::RayScene(const Scene& scene) : scene_(scene) {
     bounds_min_ = glm::vec3(std::numeric_limits<float>::max());
@@ -172,13 +174,12 @@ RayScene::RayScene(const Scene& scene) : scene_(scene) {
     all_ = std::make_unique<Embree>(*this, Surfaces::All);
     if (!any_leaf) return;
     walls_ = std::make_unique<Embree>(*this, Surfaces::Walls);
-    leaves_ = std::make_unique<Embree>(*this, Surfaces::Leaves);
 }
 
 RayScene::~RayScene() = default;
 
 const RayScene::Embree& RayScene::embree(Surfaces surfaces) const {
-    return surfaces == Surfaces::Walls && walls_ ? *walls_ : surfaces == Surfaces::Leaves && leaves_ ? *leaves_ : *all_;
+    return surfaces == Surfaces::Walls && walls_ ? *walls_ : *all_;
 }
 
 glm::vec3 RayScene::corner(uint32_t triangle, int i) const {
@@ -213,13 +214,14 @@ float RayScene::alphaAt(uint32_t triangle, float u, float v) const {
 }
 
 std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
-                                     Surfaces surfaces, uint32_t ignored) const {
+                                     Surfaces surfaces, uint32_t ignored, LeafHits* leaves) const {
     const Embree& among = embree(surfaces);
+    std::optional<Hit> found;
     float near_m = 0;
     for (int layer = 0; layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent))
-            return std::nullopt;
+        if (!among.intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent, leaves))
+            break;
         const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
         const Hit hit{.triangle = triangle,
                       .distance_m = r.ray.tfar,
@@ -227,19 +229,25 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
                       .v = r.hit.v,
                       .back = glm::dot(direction, triangles_[triangle].normal) > 0};
         const bool there = ignored == no_model || triangles_[triangle].model != ignored;
-        if (there && r.hit.geomID == 0) return hit;
-        if (there && unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v)) return hit;
+        const bool stops = r.hit.geomID == opaque ||
+                           unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v);
+        if (there && stops) {
+            found = hit;
+            break;
+        }
         near_m = r.ray.tfar + step_past_m;
     }
-    return std::nullopt;
+    if (leaves) finish(*leaves, direction, found ? found->distance_m : distance_max_m);
+    return found;
 }
 
 float RayScene::transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
-                                     float distance_m) const {
+                                     float distance_m, LeafHits* leaves) const {
     float passed = 1, near_m = 0;
     for (int layer = 0; layer < transparent_layers_max && passed > 0; ++layer) {
         RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_opaque | mask_transparent)) return passed;
+        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_opaque | mask_transparent, leaves))
+            return passed;
         const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
         if (triangles_[triangle].model != model) passed *= 1 - alphaAt(triangle, r.hit.u, r.hit.v);
         near_m = r.ray.tfar + step_past_m;
@@ -248,36 +256,41 @@ float RayScene::transmittanceWithout(uint32_t model, const Embree& among, glm::v
 }
 
 float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces,
-                              uint32_t ignored) const {
+                              uint32_t ignored, LeafHits* leaves) const {
     const Embree& among = embree(surfaces);
-    if (ignored != no_model) return transmittanceWithout(ignored, among, origin, direction, distance_m);
-    if (among.occluded(origin, direction, distance_m, mask_opaque)) return 0;
+    float passed = 1;
+    if (ignored != no_model) {
+        passed = transmittanceWithout(ignored, among, origin, direction, distance_m, leaves);
+    } else {
+        if (among.occluded(origin, direction, distance_m, mask_opaque, leaves)) return 0;
+        if (among.anyTransparent()) passed = throughTransparent(among, origin, direction, distance_m);
+    }
+    if (leaves && passed > 0) finish(*leaves, direction, distance_m);
+    return passed;
+}
+
+float RayScene::throughTransparent(const Embree& among, glm::vec3 origin, glm::vec3 direction, float distance_m) const {
     float passed = 1, near_m = 0;
-    for (int layer = 0; among.anyTransparent() && layer < transparent_layers_max; ++layer) {
+    for (int layer = 0; layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
-        passed *= 1 - alphaAt(among.triangle_of[1][r.hit.primID], r.hit.u, r.hit.v);
+        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) break;
+        passed *= 1 - alphaAt(among.triangle_of[transparent][r.hit.primID], r.hit.u, r.hit.v);
         if (passed <= 0) return 0;
         near_m = r.ray.tfar + step_past_m;
     }
     return passed;
 }
 
-LeafHits RayScene::leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const {
-    LeafHits found;
-    if (!leaves_ || !leaf_boxes_.mayHit(origin, direction, distance_m)) return found;
-    Collector collector{.context = {}, .hits = found, .triangle_of = leaves_->triangle_of};
-    rtcInitIntersectContext(&collector.context);
-    collector.context.filter = collect;
-    RTCRayHit r;
-    leaves_->prepare(r, origin, direction, 0, distance_m, mask_opaque | mask_transparent);
-    rtcIntersect1(leaves_->scene, &collector.context, &r);
-    std::sort(found.hits.data(), found.hits.data() + found.count, [](const Hit& a, const Hit& b) {
+// Rays meet leaves in no order, and some behind what stopped them.
+void RayScene::finish(LeafHits& leaves, glm::vec3 direction, float distance_m) const {
+    if (leaves.count == 0) return;
+    const auto behind =
+        std::remove_if(leaves.begin(), leaves.end(), [&](const Hit& h) { return h.distance_m > distance_m; });
+    leaves.count = static_cast<uint32_t>(behind - leaves.begin());
+    std::sort(leaves.begin(), leaves.end(), [](const Hit& a, const Hit& b) {
         return std::tie(a.distance_m, a.triangle) < std::tie(b.distance_m, b.triangle);
     });
-    for (uint32_t i = 0; i < found.count; ++i)
-        found.hits[i].back = glm::dot(direction, triangles_[found.hits[i].triangle].normal) > 0;
-    return found;
+    for (Hit& hit : leaves) hit.back = glm::dot(direction, triangles_[hit.triangle].normal) > 0;
 }
 
 bool RayScene::blocked(glm::vec3 from, glm::vec3 to) const {

@@ -32,8 +32,8 @@ struct LevelTriangle {
     uint32_t model = no_model;          // that it belongs to
 };
 
-// What a ray meets: everything, with every leaf where it stands; only what is always there; or leaves alone.
-enum class Surfaces { All, Walls, Leaves };
+// What stops a ray: everything, with every leaf where it stands; or only what is always there.
+enum class Surfaces { All, Walls };
 
 struct Hit {
     uint32_t triangle = 0;  // into RayScene::triangles()
@@ -42,7 +42,8 @@ struct Hit {
     bool back = false;   // the side that faces away from the triangle's front was hit
 };
 
-// Leaf surfaces along one ray. More than these lie one behind another nowhere that light should get through.
+// Surfaces of doors' leaves along one ray, nearest first. More than these lie one behind another nowhere that light
+// should get through.
 struct LeafHits {
     static constexpr uint32_t max = 32;
     uint32_t count = 0;
@@ -52,6 +53,8 @@ struct LeafHits {
 
     LeafHits() {}
 
+    Hit* begin() { return hits.data(); }
+    Hit* end() { return hits.data() + count; }
     const Hit* begin() const { return hits.data(); }
     const Hit* end() const { return hits.data() + count; }
 };
@@ -65,17 +68,23 @@ class RayScene {
     RayScene& operator=(const RayScene&) = delete;
 
     // The nearest surface that stops the ray. A blended surface stops it with probability alpha, drawn from `seed`;
-    // a masked one where its alpha is at or above the cutoff. `ignored`: a model that is not there.
+    // a masked one where its alpha is at or above the cutoff. `ignored`: a model that is not there. `leaves`, when
+    // given (with Walls): takes the leaves on the way there, whether they stop light or not; it costs no ray of its
+    // own.
     std::optional<Hit> nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
-                               Surfaces surfaces = Surfaces::All, uint32_t ignored = no_model) const;
+                               Surfaces surfaces = Surfaces::All, uint32_t ignored = no_model,
+                               LeafHits* leaves = nullptr) const;
 
-    // The share of light, 0..1, that passes from `origin` along `direction` for `distance_m`.
+    // The share of light, 0..1, that passes from `origin` along `direction` for `distance_m`. `leaves`: as above, where
+    // some does.
     float transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces = Surfaces::All,
-                        uint32_t ignored = no_model) const;
+                        uint32_t ignored = no_model, LeafHits* leaves = nullptr) const;
 
-    // The surfaces of doors' leaves along a ray, nearest first, whether they stop it or not.
-    LeafHits leavesAlong(glm::vec3 origin, glm::vec3 direction, float distance_m) const;
-    bool anyLeaf() const { return leaves_ != nullptr; }
+    bool anyLeaf() const { return walls_ != nullptr; }
+    // False only where a ray of any length meets no leaf: cheaper than to trace it.
+    bool mayMeetLeaf(glm::vec3 origin, glm::vec3 direction) const {
+        return anyLeaf() && leaf_boxes_.mayHit(origin, direction, far_away_m);
+    }
     // The share of light, 0..1, that a surface stops there.
     float alphaAt(uint32_t triangle, float u, float v) const;
 
@@ -95,11 +104,13 @@ class RayScene {
     struct Embree;
     const Embree& embree(Surfaces surfaces) const;
     float transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
-                               float distance_m) const;
+                               float distance_m, LeafHits* leaves) const;
+    float throughTransparent(const Embree& among, glm::vec3 origin, glm::vec3 direction, float distance_m) const;
+    void finish(LeafHits& leaves, glm::vec3 direction, float distance_m) const;
 
     const Scene& scene_;
     std::vector<LevelTriangle> triangles_;
-    std::unique_ptr<Embree> all_, walls_, leaves_;  // the last two only where there are doors
+    std::unique_ptr<Embree> all_, walls_;  // the second, with leaves that stop nothing, only where there are doors
     LeafBoxes leaf_boxes_;
     glm::vec3 bounds_min_{0}, bounds_max_{0};
 };
