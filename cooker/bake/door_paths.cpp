@@ -127,6 +127,14 @@ DoorPaths::DoorPaths(const Scene& scene, std::span<const DoorIndices> closed_tog
             group_of_.push_back(g);
             only_door_.push_back(paths_[p].size() == 1 ? paths_[p][0] / 2 : no_door);
         }
+    less_closed_.assign(terms_.size(), no_term);
+    more_closed_.resize(terms_.size());
+    for (uint32_t t = 0; t < terms_.size(); ++t) {
+        if (terms_[t].doors_open.empty() || terms_[t].doors_closed.empty()) continue;
+        less_closed_[t] =
+            term(group_of_[t], without_[path_of_[t] * condition_count_ + 2 * terms_[t].doors_closed.back()]);
+        more_closed_[less_closed_[t]].push_back(t);
+    }
     for (uint32_t g = 0; g < group_count_; ++g)
         for (uint32_t p = 0; p < paths_.size(); ++p) {
             if (kept[g].contains(paths_[p])) continue;

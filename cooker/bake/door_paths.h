@@ -89,6 +89,12 @@ class DoorPaths {
     uint32_t term(uint32_t group, uint32_t path) const {
         return path == no_path ? no_term : term_of_[path * group_count_ + group];
     }
+    // Of a term that needs a door open and others closed, the one that asks for one closed door less: light too faint
+    // for records of its own counts there, and is too much only while that door is open as well. no_term: there is
+    // none.
+    uint32_t lessClosed(uint32_t term) const { return less_closed_[term]; }
+    // All terms whose lessClosed() is `term`.
+    const std::vector<uint32_t>& moreClosed(uint32_t term) const { return more_closed_[term]; }
     // The one door that a term is about; no_door where there are none or several.
     uint32_t onlyDoor(uint32_t term) const { return only_door_[term]; }
     // What light of term `from` becomes along a ray of `path` to a receiver that is there under `own`, whose terms do
@@ -106,14 +112,15 @@ class DoorPaths {
 
    private:
     uint32_t condition_count_ = 0, group_count_ = 1;
-    std::vector<std::vector<uint32_t>> paths_;  // conditions, ascending
-    std::vector<uint32_t> with_;                // path, condition
-    std::vector<uint8_t> needs_;                // path, condition
-    std::vector<uint32_t> without_;             // path, condition: without it; no_path where it needs the opposite
-    std::vector<uint32_t> joined_;              // path, path
-    std::vector<uint32_t> term_of_;             // path, group
-    std::vector<uint32_t> path_of_, group_of_;  // per term
-    std::vector<uint32_t> only_door_;           // per term
+    std::vector<std::vector<uint32_t>> paths_;       // conditions, ascending
+    std::vector<uint32_t> with_;                     // path, condition
+    std::vector<uint8_t> needs_;                     // path, condition
+    std::vector<uint32_t> without_;                  // path, condition: without it; no_path where it needs the opposite
+    std::vector<uint32_t> joined_;                   // path, path
+    std::vector<uint32_t> term_of_;                  // path, group
+    std::vector<uint32_t> path_of_, group_of_;       // per term
+    std::vector<uint32_t> only_door_, less_closed_;  // per term
+    std::vector<std::vector<uint32_t>> more_closed_;  // per term
     std::vector<Term> terms_;
     std::vector<uint32_t> number_in_group_;        // per term
     std::vector<std::vector<uint32_t>> terms_of_;  // per group

@@ -72,6 +72,17 @@ void FinalGather<Light>::aim(const GatherFrom& from, std::span<const uint32_t> t
     }
 }
 
+// Terms that are not asked for and count for one that is.
+template <class Light>
+void FinalGather<Light>::takeAlong(uint32_t term, uint32_t into) {
+    for (const uint32_t t : gatherer_.paths().moreClosed(term)) {
+        if (round_.wants(t)) continue;
+        round_.setInto(t, into);
+        along_.emplace_back(t, into);
+        takeAlong(t, into);
+    }
+}
+
 // By past rounds alone, so that no round's own luck decides what it counts for.
 template <class Light>
 bool FinalGather<Light>::aimPays(uint32_t term) const {
@@ -89,6 +100,9 @@ void FinalGather<Light>::leaveAim(uint32_t term) {
 template <class Light>
 void FinalGather<Light>::want(uint32_t term, bool wanted) {
     round_.setWanted(term, wanted);
+    if (!wanted)
+        for (const auto& [other, into] : along_)
+            if (into == term) round_.setWanted(other, false);
     wanted_in_group_[gatherer_.paths().terms()[term].group] += wanted ? 1u : UINT32_MAX;
 }
 
@@ -108,6 +122,8 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
         state_[t] = {};
         want(t, true);
     }
+    along_.clear();
+    for (uint32_t t : terms) takeAlong(t, t);
     aim(from, terms, options);
     const uint32_t rounds_max = std::max(1u, (options.rays_max + rays_per_round / 2) / rays_per_round);
     size_t waiting = terms.size();

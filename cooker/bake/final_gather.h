@@ -56,6 +56,7 @@ class FinalGather {
     };
     void aim(const GatherFrom& from, std::span<const uint32_t> terms, const FinalGatherOptions& options);
     void want(uint32_t term, bool wanted);
+    void takeAlong(uint32_t term, uint32_t into);
     bool aimPays(uint32_t term) const;
     void leaveAim(uint32_t term);
     static RowEnds* endsOfRound(RowEnds* row, uint32_t round);
@@ -65,8 +66,9 @@ class FinalGather {
     std::vector<uint32_t> wanted_in_aim_;  // terms that are not done
     TermAccumulator<Light> round_;         // wants the terms that are not done
     std::vector<State> state_;
-    std::vector<uint16_t> aim_of_term_;   // of the terms that are asked for
-    std::vector<float> spared_variance_;  // per term; see DoorAims
+    std::vector<std::pair<uint32_t, uint32_t>> along_;  // terms not asked for, and what they count for
+    std::vector<uint16_t> aim_of_term_;                 // of the terms that are asked for
+    std::vector<float> spared_variance_;                // per term; see DoorAims
     std::vector<uint32_t> wanted_in_group_;
 };
 

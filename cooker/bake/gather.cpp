@@ -198,6 +198,13 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
     }
 }
 
+// The term that light of a group over a path is added to; no_term where nobody wants it.
+template <class Light>
+uint32_t Gatherer::wantedOf(uint32_t group, uint32_t path, const TermAccumulator<Light>& sum) const {
+    const uint32_t term = paths_.term(group, path);
+    return term == no_term ? no_term : sum.into(term);
+}
+
 // Whether a ray with known ends can bring anything that is wanted.
 template <class Light>
 bool Gatherer::brings(std::span<const PathEnd> ends, const GatherFrom& from, const SparseLight* outgoing,
@@ -205,8 +212,7 @@ bool Gatherer::brings(std::span<const PathEnd> ends, const GatherFrom& from, con
     return std::ranges::any_of(ends, [&](const PathEnd& p) {
         if (p.end == RayEnd::nothing) return false;
         if (p.end == RayEnd::sky) {
-            const uint32_t term = paths_.term(always_group, p.path);
-            return term != no_term && sum.wants(term);
+            return wantedOf(always_group, p.path, sum) != no_term;
         }
         if (!outgoing || !outgoing->any(p.end)) return false;
         if (from.condition != no_condition || p.path != free_path) return true;
@@ -276,8 +282,8 @@ void Gatherer::add(const Ray<Light>& ray, uint32_t path, uint32_t term, glm::vec
 
 template <class Light>
 void Gatherer::takeSky(const Ray<Light>& ray, uint32_t path) const {
-    const uint32_t term = paths_.term(always_group, path);
-    if (term == no_term || !ray.sum.wants(term) || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
+    const uint32_t term = wantedOf(always_group, path, ray.sum);
+    if (term == no_term || rays_.scene().sky_radiance_cd_m2 == glm::vec3(0)) return;
     // An image sky has rays of its own; see sampleSky.
     if (ray.aim && !sky_.empty()) return;
     const uint32_t aim = sky_.empty() && !ray.aims.all.empty() ? ray.aims.of_term[term] : 0;
@@ -332,7 +338,7 @@ uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) co
         const float by_area = static_cast<float>(ray.options.emitter_samples) *
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
         const float by_hit = ray.density(path);
-        if (const uint32_t term = paths_.term(e->group, path); term != no_term && ray.sum.wants(term))
+        if (const uint32_t term = wantedOf(e->group, path, ray.sum); term != no_term)
             ray.sum[term].add(e->radiance_cd_m2 * (ray.alone(path) * by_hit / (by_hit + by_area)), ray.weights);
     }
     uint32_t found = receiverOf(unwrap_, texels_, hit);
@@ -350,8 +356,10 @@ void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path)
     const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
     const float alone = ray.alone(path);
     for (const TermLight& light : ray.outgoing->row(receiver)) {
-        const uint32_t term = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
-        if (term == no_term || !ray.sum.wants(term)) continue;
+        const uint32_t found = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
+        if (found == no_term) continue;
+        const uint32_t term = ray.sum.into(found);
+        if (term == no_term) continue;
         if (any_aim)
             add(ray, path, term, light.value, ray.aims.of_term[term]);
         else
@@ -382,7 +390,7 @@ void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, T
         forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction, far_away_m,
                    [&](float passed, uint32_t path) {
                        const float by_ray = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
-                       if (const uint32_t term = paths_.term(always_group, path); term != no_term && sum.wants(term))
+                       if (const uint32_t term = wantedOf(always_group, path, sum); term != no_term)
                            sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), weights);
                    });
     }
@@ -424,9 +432,9 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
                 rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
                 s.distance_m * shadow_end_share, [&](float passed, uint32_t way) {
                     const uint32_t path = onto(way, from.condition, target);
-                    const uint32_t term = paths_.term(range.group, path);
+                    const uint32_t term = wantedOf(range.group, path, sum);
                     const float by_hit = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
-                    if (term != no_term && sum.wants(term))
+                    if (term != no_term)
                         sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)), Light::weightsOf(d));
                 });
         }

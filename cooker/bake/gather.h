@@ -233,6 +233,8 @@ class Gatherer {
     template <class Light>
     void takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path) const;
     template <class Light>
+    uint32_t wantedOf(uint32_t group, uint32_t path, const TermAccumulator<Light>& sum) const;
+    template <class Light>
     bool brings(std::span<const PathEnd> ends, const GatherFrom& from, const SparseLight* outgoing,
                 const TermAccumulator<Light>& sum) const;
     template <class Light>

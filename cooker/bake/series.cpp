@@ -11,6 +11,7 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <ranges>
 
 namespace dimmer::cook {
 namespace {
@@ -372,12 +373,21 @@ class Expansion {
         }
         SparseLight active = activeAround(out_.bounced);
         std::vector<double> dropped(terms_);
+        std::vector<uint32_t> taken_along;  // at the receiver that was visited last
+        size_t last = receivers_;
         forEachPair([&](size_t i, uint32_t t, float direct, float, float stored) {
+            if (i != last) taken_along.clear();
+            last = i;
             const double energy = static_cast<double>(gatherer_.areaM2(i) * stored);
             out_.reports[t].energy += energy;
             const auto row = active.row(i);
-            if (!out_.active(t, direct, 0) && std::ranges::find(row, t, &TermLight::term) == row.end())
+            if (!out_.active(t, direct, 0) && std::ranges::find(row, t, &TermLight::term) == row.end() &&
+                std::ranges::find(taken_along, t) == taken_along.end()) {
                 dropped[t] += energy;
+                return;
+            }
+            const auto& along = paths_.moreClosed(t);
+            taken_along.insert(taken_along.end(), along.begin(), along.end());
         });
         for (uint32_t t = 0; t < terms_; ++t)
             if (out_.reports[t].energy > 0) out_.reports[t].energy_dropped = dropped[t] / out_.reports[t].energy;
@@ -400,6 +410,12 @@ class Expansion {
                     forEachAround(i, add);
                 else
                     add(i);
+                for (const uint32_t t : sum.touched() | std::views::reverse) {
+                    const uint32_t rest = paths_.lessClosed(t);
+                    if (rest == no_term || out_.active(t, 0, luminance(sum[t] / count))) continue;
+                    sum[rest] += sum[t];
+                    sum[t] = glm::vec3(0);
+                }
                 takeRow(sum, row);
                 for (TermLight& l : row) l.value /= count;
                 std::erase_if(row, [&](const TermLight& l) { return !out_.active(l.term, 0, luminance(l.value)); });

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <cstring>
 #include <glm/glm.hpp>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -128,12 +129,17 @@ template <class Value>
 class TermAccumulator {
    public:
     explicit TermAccumulator(uint32_t terms)
-        : values_(terms), marks_((terms + marks_per_word - 1) / marks_per_word * marks_per_word), unwanted_(terms) {}
+        : values_(terms), marks_((terms + marks_per_word - 1) / marks_per_word * marks_per_word), into_(terms) {
+        std::iota(into_.begin(), into_.end(), 0u);
+    }
 
-    // What nobody wants need not be added up; all are wanted to begin with.
-    bool wants(uint32_t term) const { return !unwanted_[term]; }
-    void setWanted(uint32_t term, bool wanted) { unwanted_[term] = !wanted; }
-    void wantNone() { std::ranges::fill(unwanted_, uint8_t{1}); }
+    // Which term light of `term` is to be added to: its own to begin with, or another, or no_term where nobody wants
+    // it.
+    uint32_t into(uint32_t term) const { return into_[term]; }
+    void setInto(uint32_t term, uint32_t other) { into_[term] = other; }
+    void setWanted(uint32_t term, bool wanted) { into_[term] = wanted ? term : no_term; }
+    bool wants(uint32_t term) const { return into_[term] != no_term; }
+    void wantNone() { std::ranges::fill(into_, no_term); }
 
     Value& operator[](uint32_t term) {
         marks_[term] = 1;  // a byte each: bits of one word would make every term wait for the one before
@@ -160,7 +166,7 @@ class TermAccumulator {
 
     std::vector<Value> values_;
     std::vector<uint8_t> marks_;  // per term, and up to a whole word
-    std::vector<uint8_t> unwanted_;
+    std::vector<uint32_t> into_;
     std::vector<uint32_t> touched_;
 };
 
