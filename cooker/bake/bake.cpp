@@ -28,7 +28,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
         FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
-        std::vector<uint32_t> terms;
+        std::vector<uint32_t> terms, of_group;
         RowEnds own_ends;
         std::vector<RowEnds> all_ends;
         uint64_t traced = 0;
@@ -42,8 +42,13 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
                 traced +=
                     gather.gather(gatherer.at(i), terms, series.radiance, options, row, ends ? &own_ends : nullptr);
             if (remembers) all_ends.push_back(own_ends);
-            for (size_t t = 0; settings.per_set_passes && t < terms.size(); ++t)
-                traced += gather.gather(gatherer.at(i), {&terms[t], 1}, series.radiance, options, row);
+            for (uint32_t g = 0; settings.per_set_passes && g < gatherer.paths().groupCount(); ++g) {
+                of_group.clear();
+                std::ranges::copy_if(terms, std::back_inserter(of_group),
+                                     [&](uint32_t t) { return gatherer.paths().group(t) == g; });
+                if (!of_group.empty()) traced += gather.gather(gatherer.at(i), of_group, series.radiance, options, row);
+            }
+            if (settings.per_set_passes) std::ranges::sort(row, {}, &ReceiverLight::term);
             // Neighbours' light may end at a wall that the chart runs under.
             std::erase_if(row, [&](const ReceiverLight& l) {
                 const auto lit = series.direct.row(i);
@@ -62,15 +67,19 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
 }
 
 // Direct light of fully baked lamps joins after the filter: it has no noise, and shadows have edges.
-Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sparse<ReceiverLight>& direct) {
+Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sparse<ReceiverLight>& direct,
+                                 const DoorPaths& paths) {
     return Sparse<ReceiverLight>::build(gathered.rows(), [&](size_t begin, size_t end, auto emit) {
         std::vector<ReceiverLight> row;
         for (size_t i = begin; i < end; ++i) {
             const auto indirect = gathered.row(i);
             row.assign(indirect.begin(), indirect.end());
-            for (const ReceiverLight& d : direct.row(i))
-                for (ReceiverLight& l : row)
-                    if (l.term == d.term) l.light += d.light;
+            for (const ReceiverLight& d : direct.row(i)) {
+                auto at = row.end();
+                for (uint32_t t = d.term; at == row.end() && t != no_term; t = paths.lessClosed(t))
+                    at = std::ranges::find(row, t, &ReceiverLight::term);
+                if (at != row.end()) at->light += d.light;
+            }
             emit(std::span<const ReceiverLight>(row));
         }
     });
@@ -105,7 +114,7 @@ FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
     FollowedLight followed{std::move(series.radiance), std::move(series.bounces)};
     series = {};
     if (settings.denoise) baked.light = denoise(gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
-    baked.light = withDirect(baked.light, direct);
+    baked.light = withDirect(baked.light, direct, gatherer.paths());
     for (size_t i = 0; i < baked.light.rows(); ++i)
         for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;
     baked.bounces = std::ranges::max(followed.bounces);

@@ -38,7 +38,7 @@ struct BakeSettings {
     uint32_t seed = 1;
     // Shadow rays only to the lights that reach a receiver's surroundings (bake/light_grid.h); off, to all of them.
     bool light_grid = true;
-    // The final gather once per term, as bakers do that know nothing of sharing rays: the same result, for
+    // The final gather once per light group, as bakers do that know nothing of sharing rays: the same result, for
     // measuring against.
     bool per_set_passes = false;
 
@@ -72,7 +72,7 @@ struct TermReport {
     float mean_lux = 0;  // luminance
     float threshold_lux = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
-    double energy_dropped = 0;  // share of it at receivers where the term is not active, 0..1
+    double energy_dropped = 0;  // share of it where neither the term is active nor one that takes it along, 0..1
 };
 
 struct BakedGrid {

@@ -111,10 +111,11 @@ std::vector<GuideBox> cluster(std::vector<Photon> photons) {
 
 }  // namespace
 
-DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint32_t>(rays.scene().light_sets.size())) {
+DoorGuides::DoorGuides(const RayScene& rays)
+    : group_count_(1 + static_cast<uint32_t>(rays.scene().light_sets.size())),
+      door_count_(static_cast<uint32_t>(rays.scene().doors.size())) {
     const Scene& scene = rays.scene();
-    const auto door_count = static_cast<uint32_t>(scene.doors.size());
-    std::vector<GuideBox> doors(door_count, empty());
+    std::vector<GuideBox> doors(door_count_, empty());
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const uint32_t condition = rays.triangles()[t].condition;
         if (condition == no_condition || (condition & 1)) continue;  // where the leaf stands closed, the opening is
@@ -123,14 +124,14 @@ DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint
     std::vector<std::vector<uint32_t>> lamps(group_count_);
     for (uint32_t l = 0; l < scene.lights.size(); ++l)
         if (scene.lights[l].bake != BakeMode::None) lamps[groupOf(scene.lights[l].light_set)].push_back(l);
-    std::vector<std::vector<GuideBox>> patches(size_t{door_count} * group_count_);
+    std::vector<std::vector<GuideBox>> patches(size_t{door_count_} * group_count_);
     tbb::parallel_for(size_t{0}, patches.size(), [&](size_t i) {
         const GuideBox& door = doors[i / group_count_];
         if (door.low.x <= door.high.x)
             patches[i] =
                 cluster(shadowPhotons(rays, lamps[i % group_count_], door, static_cast<uint32_t>(i / group_count_)));
     });
-    for (uint32_t d = 0; d < door_count; ++d) {
+    for (uint32_t d = 0; d < door_count_; ++d) {
         boxes_.emplace_back();
         if (doors[d].low.x <= doors[d].high.x) boxes_.back() = {doors[d]};
         identity_.push_back(d);
@@ -141,6 +142,7 @@ DoorGuides::DoorGuides(const RayScene& rays) : group_count_(1 + static_cast<uint
         if (patches[i].empty()) continue;
         boxes_.push_back(boxes_[door]);
         boxes_.back().insert(boxes_.back().end(), patches[i].begin(), patches[i].end());
+        group_of_.push_back(group);
         identity_.push_back(hash(hash(door, 1), groupIdentity(scene, group)));
     }
 }

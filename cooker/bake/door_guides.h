@@ -22,6 +22,7 @@ struct GuideBox {
 inline constexpr uint32_t patch_boxes_max = 7;
 
 inline constexpr uint32_t no_guide = UINT32_MAX;
+inline constexpr uint32_t shared_guide = UINT32_MAX;  // in place of a light group
 
 // A guide for every door, and another one for every light group whose own lamps shine through it: what one group's rays
 // look at depends on no other's lamps. Immutable after construction.
@@ -32,13 +33,18 @@ class DoorGuides {
     uint32_t guideOf(uint32_t door, uint32_t group) const { return guide_of_[door * group_count_ + group]; }
     // The door's own box first, then at most patch_boxes_max of patches.
     std::span<const GuideBox> boxes(uint32_t guide) const { return boxes_[guide]; }
+    // Whose light alone asks for it; shared_guide: of several groups.
+    uint32_t ownGroup(uint32_t guide) const {
+        return guide < door_count_ ? shared_guide : group_of_[guide - door_count_];
+    }
     // For seeds.
     uint32_t identity(uint32_t guide) const { return identity_[guide]; }
 
    private:
-    uint32_t group_count_ = 1;
+    uint32_t group_count_ = 1, door_count_ = 0;
     std::vector<uint32_t> guide_of_;            // door, group
     std::vector<std::vector<GuideBox>> boxes_;  // per guide; those of doors alone come first
+    std::vector<uint32_t> group_of_;            // per guide with patches
     std::vector<uint32_t> identity_;            // per guide
 };
 

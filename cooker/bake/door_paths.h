@@ -73,6 +73,7 @@ class DoorPaths {
     uint32_t groupCount() const { return group_count_; }
     // Ascending.
     const std::vector<uint32_t>& termsOf(uint32_t group) const { return terms_of_[group]; }
+    uint32_t group(uint32_t term) const { return group_of_[term]; }
     // The term's place among those of its group.
     uint32_t numberInGroup(uint32_t term) const { return number_in_group_[term]; }
 

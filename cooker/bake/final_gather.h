@@ -39,8 +39,9 @@ class FinalGather {
     }
 
     // Appends to `out` the light of `terms` (ascending) at `from`. Rays are shared, decisions are not: a term's
-    // value and sample count do not depend on which other terms are asked for. `ends`, when given: of the first rays,
-    // and takes those of others, up to kept_rays_max. Returns the rays traced.
+    // value and sample count do not depend on which terms of other light groups are asked for. Of its own group, terms
+    // that are not asked for count for it where it takes them along (DoorPaths::moreClosed). `ends`, when given: of the
+    // first rays, and takes those of others, up to kept_rays_max. Returns the rays traced.
     uint64_t gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
                     const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out, RowEnds* ends = nullptr);
 
@@ -63,7 +64,7 @@ class FinalGather {
 
     const Gatherer& gatherer_;
     std::vector<DoorAim> aims_;
-    std::vector<uint32_t> wanted_in_aim_;  // terms that are not done
+    std::vector<uint32_t> wanted_in_aim_;  // terms that are not done and have not left it
     TermAccumulator<Light> round_;         // wants the terms that are not done
     std::vector<State> state_;
     std::vector<std::pair<uint32_t, uint32_t>> along_;  // terms not asked for, and what they count for

@@ -167,7 +167,7 @@ uint32_t Gatherer::guideOf(uint32_t term) const {
 }
 
 DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
-    DoorAim aim{guide, {}};
+    DoorAim aim{guide, guides_.ownGroup(guide), {}};
     for (const SamplePoint& p : from.points)
         aim.from_point.emplace_back(guides_.boxes(guide), p.position_m,
                                     p.face == no_face ? glm::vec3(0) : frameOf(p).normal);
@@ -275,9 +275,10 @@ void Gatherer::add(const Ray<Light>& ray, uint32_t path, uint32_t term, glm::vec
     const glm::vec3 lux = radiance * share;
     ray.sum[term].add(lux, ray.weights);
     if (ray.aim == 0 || ray.aims.spared_variance.empty()) return;
-    // A ray that brings x, found `alone / share` times as rarely, brings as much more: E[x^2] grows by that.
+    // Of light L and its weight w, by the densities D of the intake's rays and A of the aimed: the gain is the integral
+    // of (L w)^2 (1 / D - 1 / (D + A)), of which this is the estimate from rays of density A.
     const float x = luminance(lux) * Light::irradiance_per_lux;
-    ray.aims.spared_variance[term] += x * x * (alone / share - 1);
+    ray.aims.spared_variance[term] += x * x * alone / share;
 }
 
 template <class Light>
@@ -355,7 +356,9 @@ template <class Light>
 void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path) const {
     const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
     const float alone = ray.alone(path);
+    const uint32_t only = ray.aim != 0 ? ray.aims.all[ray.aim - 1].group : shared_guide;
     for (const TermLight& light : ray.outgoing->row(receiver)) {
+        if (only != shared_guide && paths_.group(light.term) != only) continue;
         const uint32_t found = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (found == no_term) continue;
         const uint32_t term = ray.sum.into(found);

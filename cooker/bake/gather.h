@@ -98,7 +98,7 @@ struct GatherOptions {
     uint32_t emitter_samples = 4;  // towards each light group's emitters, and towards an image sky
     uint32_t seed = 0;
     uint32_t first_ray = 0;  // where in the receiver's sequence to go on: rounds of one gather are one sequence
-    // More rays by the intake, of which only those that meet a door's leaf are traced on, and only light over paths
+    // More rays by the intake, of which only those that may meet a door's leaf are traced, and only light over paths
     // that need a door is taken. Not together with aims or rounds.
     uint32_t door_rays = 0;
     // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
@@ -114,6 +114,7 @@ struct GatherOptions {
 // Rays towards one door and what a light group lights through it, for the terms of that guide.
 struct DoorAim {
     uint32_t guide = 0;             // of DoorGuides
+    uint32_t group = shared_guide;  // whose light alone it is for
     std::vector<Guide> from_point;  // one per point of the receiver
 };
 
@@ -124,7 +125,7 @@ struct DoorAims {
     std::span<const uint16_t> of_term = {};
     std::span<const uint32_t> wanted = {};
     // Per term, added to: by how much the light that aimed rays find would spread a gather's sum more if only rays by
-    // the intake looked for it (variance of the luminance of irradiance, lux^2). Null: nobody asks.
+    // the intake looked for it (variance of the luminance of irradiance, lux^2). Empty: nobody asks.
     std::span<float> spared_variance = {};
 };
 

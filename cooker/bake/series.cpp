@@ -373,21 +373,14 @@ class Expansion {
         }
         SparseLight active = activeAround(out_.bounced);
         std::vector<double> dropped(terms_);
-        std::vector<uint32_t> taken_along;  // at the receiver that was visited last
-        size_t last = receivers_;
         forEachPair([&](size_t i, uint32_t t, float direct, float, float stored) {
-            if (i != last) taken_along.clear();
-            last = i;
             const double energy = static_cast<double>(gatherer_.areaM2(i) * stored);
             out_.reports[t].energy += energy;
             const auto row = active.row(i);
-            if (!out_.active(t, direct, 0) && std::ranges::find(row, t, &TermLight::term) == row.end() &&
-                std::ranges::find(taken_along, t) == taken_along.end()) {
-                dropped[t] += energy;
-                return;
-            }
-            const auto& along = paths_.moreClosed(t);
-            taken_along.insert(taken_along.end(), along.begin(), along.end());
+            bool kept = out_.active(t, direct, 0);
+            for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
+                kept = std::ranges::find(row, into, &TermLight::term) != row.end();
+            if (!kept) dropped[t] += energy;
         });
         for (uint32_t t = 0; t < terms_; ++t)
             if (out_.reports[t].energy > 0) out_.reports[t].energy_dropped = dropped[t] / out_.reports[t].energy;
@@ -410,18 +403,28 @@ class Expansion {
                     forEachAround(i, add);
                 else
                     add(i);
-                for (const uint32_t t : sum.touched() | std::views::reverse) {
-                    const uint32_t rest = paths_.lessClosed(t);
-                    if (rest == no_term || out_.active(t, 0, luminance(sum[t] / count))) continue;
-                    sum[rest] += sum[t];
-                    sum[t] = glm::vec3(0);
-                }
+                foldFaint(out_.direct.row(i), count, sum);
                 takeRow(sum, row);
                 for (TermLight& l : row) l.value /= count;
                 std::erase_if(row, [&](const TermLight& l) { return !out_.active(l.term, 0, luminance(l.value)); });
                 emit(std::span<const TermLight>(row));
             }
         });
+    }
+
+    // What is too faint for records of its own counts for the term that takes it along. `count`: of the receivers in
+    // `sum`; `direct`: the middle one's.
+    void foldFaint(std::span<const TermLight> direct, float count, TermAccumulator<glm::vec3>& sum) const {
+        for (const uint32_t t : sum.touched())
+            for (uint32_t into = paths_.lessClosed(t); into != no_term; into = paths_.lessClosed(into)) sum[into];
+        for (const uint32_t t : sum.touched() | std::views::reverse) {
+            const uint32_t into = paths_.lessClosed(t);
+            if (into == no_term || out_.active(t, 0, luminance(sum[t] / count))) continue;
+            const auto lit = std::ranges::find(direct, t, &TermLight::term);
+            if (lit != direct.end() && out_.active(t, luminance(lit->value), 0)) continue;
+            sum[into] += sum[t];
+            sum[t] = glm::vec3(0);
+        }
     }
 
     // Charts that came with the level may hold islands that only the page has side by side.

@@ -1,4 +1,5 @@
-// The boxes of a level's door leaves, where they are few: most rays miss all of them, and need not enter a tree.
+// The boxes of a level's door leaves, where they are not too many: most rays miss all of them, and those that look for
+// doors alone need not be traced.
 #pragma once
 
 #include <algorithm>
@@ -55,7 +56,7 @@ class LeafBoxes {
     }
 
    private:
-    static constexpr size_t most = 16;
+    static constexpr size_t most = 128;
     // Above the rounding of coordinates at 1 km (6e-5 m).
     static constexpr float margin_m = 1e-3f;
     static constexpr std::array<float, most> nowhere = [] {

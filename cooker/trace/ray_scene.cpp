@@ -24,21 +24,29 @@ constexpr int transparent_layers_max = 64;
 // What a ray carries along: where it leaves the leaves that it meets.
 struct Collector {
     RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
-    LeafHits* leaves;             // not null for rays that meet leaves
+    LeafHits* leaves;             // null: they are passed by
 
     explicit Collector(LeafHits* into) : leaves(into) { rtcInitIntersectContext(&context); }
 };
 
 void collect(const RTCFilterFunctionNArguments* args) {
-    LeafHits& leaves = *reinterpret_cast<Collector*>(args->context)->leaves;
+    auto* const into = reinterpret_cast<Collector*>(args->context)->leaves;
     const auto* ray = reinterpret_cast<const RTCRay*>(args->ray);
     const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
     args->valid[0] = 0;  // go on
-    if (leaves.count == LeafHits::max) return;
+    if (!into) return;
+    LeafHits& leaves = *into;
     const uint32_t triangle = static_cast<const uint32_t*>(args->geometryUserPtr)[hit->primID];
     // A triangle may be split among Embree's nodes, and be met in each.
     if (std::ranges::find(leaves, triangle, &Hit::triangle) != leaves.end()) return;
-    leaves.hits[leaves.count++] = {triangle, ray->tfar, hit->u, hit->v, false};
+    const Hit found{triangle, ray->tfar, hit->u, hit->v, false};
+    if (leaves.count < LeafHits::max) {
+        leaves.hits[leaves.count++] = found;
+        return;
+    }
+    // The nearest are kept: what lies behind the wall, which may not be found yet, must not push them out.
+    Hit& farthest = *std::ranges::max_element(leaves, {}, &Hit::distance_m);
+    if (found.distance_m < farthest.distance_m) farthest = found;
 }
 
 }  // namespace
