@@ -14,7 +14,7 @@ constexpr uint32_t rounds_min = 4;
 constexpr float normal_95 = 1.96f;
 // Rays are aimed for a term while without them, by what they found, its rounds would differ by more than this many
 // times their variance more: where a light comes from all around, or the door is out of sight, they gain nothing.
-constexpr float aim_gain_min = 2;
+constexpr float aim_gain_min = 3;
 // Light below this share of its term's mean need not be exact to a share of itself: the error metric's own floor.
 constexpr float noise_floor = 0.01f;
 // Terms with doors are many and faint, and would keep rays going for the others: they need not be exact to a share of
