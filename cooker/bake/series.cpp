@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
-#include <ranges>
 
 namespace dimmer::cook {
 namespace {
@@ -403,28 +402,12 @@ class Expansion {
                     forEachAround(i, add);
                 else
                     add(i);
-                foldFaint(out_.direct.row(i), count, sum);
                 takeRow(sum, row);
                 for (TermLight& l : row) l.value /= count;
                 std::erase_if(row, [&](const TermLight& l) { return !out_.active(l.term, 0, luminance(l.value)); });
                 emit(std::span<const TermLight>(row));
             }
         });
-    }
-
-    // What is too faint for records of its own counts for the term that takes it along. `count`: of the receivers in
-    // `sum`; `direct`: the middle one's.
-    void foldFaint(std::span<const TermLight> direct, float count, TermAccumulator<glm::vec3>& sum) const {
-        for (const uint32_t t : sum.touched())
-            for (uint32_t into = paths_.lessClosed(t); into != no_term; into = paths_.lessClosed(into)) sum[into];
-        for (const uint32_t t : sum.touched() | std::views::reverse) {
-            const uint32_t into = paths_.lessClosed(t);
-            if (into == no_term || out_.active(t, 0, luminance(sum[t] / count))) continue;
-            const auto lit = std::ranges::find(direct, t, &TermLight::term);
-            if (lit != direct.end() && out_.active(t, luminance(lit->value), 0)) continue;
-            sum[into] += sum[t];
-            sum[t] = glm::vec3(0);
-        }
     }
 
     // Charts that came with the level may hold islands that only the page has side by side.
