@@ -237,9 +237,11 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
                       .v = r.hit.v,
                       .back = glm::dot(direction, triangles_[triangle].normal) > 0};
         const bool there = ignored == no_model || triangles_[triangle].model != ignored;
-        const bool stops = r.hit.geomID == opaque ||
-                           unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v);
-        if (there && stops) {
+        const auto stops = [&] {
+            return r.hit.geomID == opaque ||
+                   unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v);
+        };
+        if (there && stops()) {
             found = hit;
             break;
         }
