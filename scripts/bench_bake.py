@@ -177,6 +177,21 @@ def verify_tables(levels, quality, points, paths, folder):
             table(["level", "stored as", "1 set: mean, 95 %", "3 sets", "8 sets"], formats))
 
 
+def openings_table(points, paths, folder):
+    """What opening each door of the house does, at final and 8 texels per metre: as it is and without combinations."""
+    rows = []
+    for name, level in (("no combinations", door_variant(folder, "doors", True)), ("its three pairs named", HOUSE)):
+        pack, report = folder / "openings.dimmer", folder / "openings.json"
+        dimmer("cook", level, "-o", pack, "--quality", "final", "--profile", HOUSE_PROFILE, "--set", "grids.global=off")
+        dimmer("verify", level, pack, "--points", points, "--paths", paths, "--no-sets", "--doors", "--json", report)
+        for d in json.loads(report.read_text())["doors"]:
+            rows.append([name, d["door"], d["light"], percent(d["error"]), f"{100 * d['bias']:+.2f} %",
+                         percent(d["reference_noise"]), str(d["points"]),
+                         percent(d["light_error"]) if "light_error" in d else ""])
+            print(*rows[-1], flush=True)
+    return table(["the house with", "door", "light", "error", "bias", "reference noise", "points", "light there"], rows)
+
+
 def house_variant(folder, name, rename):
     """The house with other light sets: rename(set, how many of it came before) -> set or None (always on)."""
     level = json.loads(HOUSE.read_text())
@@ -285,7 +300,7 @@ def main():
     parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
-    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets", "doors"], help="one part of it")
+    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets", "doors", "openings"], help="one part of it")
     parser.add_argument("--runs", type=int, default=3, help="cooks of each kind, of which the median counts")
     options = parser.parse_args()
     levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
@@ -299,6 +314,10 @@ def main():
         if options.only in (None, "doors"):
             refresh("doors", f"`scripts/bench bake --only doors --runs {options.runs}`\n\n"
                     + doors_table(folder, options.runs))
+        if options.only in (None, "openings"):
+            refresh("openings", f"`scripts/bench bake --only openings --points {options.points} "
+                    f"--verify-paths {options.verify_paths}`\n\n"
+                    + openings_table(options.points, options.verify_paths, folder))
         if levels and options.only in (None, "reference"):
             refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
                     + reference_table(levels, options.paths, folder))

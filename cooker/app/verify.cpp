@@ -51,12 +51,19 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
     for (const FormatError& f : r.formats)
         fmt::print("{:<12} {:<8} {:>6} {:>6.2f} % {:>6.2f} %\n", nameOf(f.color_format), nameOf(f.direction_model),
                    f.sets, 100 * f.mean, 100 * f.p95);
-    if (r.sets.empty()) return;
-    fmt::print("\n{:<26} {:>8} {:>8} {:>8} {:>10} {:>14}\n", "light set, alone", "error", "bias", "points",
-               "ref. noise", "energy dropped");
+    if (!r.sets.empty())
+        fmt::print("\n{:<26} {:>8} {:>8} {:>8} {:>10} {:>14}\n", "light set, alone", "error", "bias", "points",
+                   "ref. noise", "energy dropped");
     for (const SetReport& s : r.sets)
         fmt::print("{:<26} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name, 100 * s.effect.error,
                    100 * s.effect.bias, s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
+    if (!r.doors.empty())
+        fmt::print("\n{:<16} {:<20} {:>8} {:>8} {:>8} {:>10} {:>20}\n", "door, opened", "light", "error", "bias",
+                   "points", "ref. noise", "light there, error");
+    for (const DoorReport& d : r.doors)
+        fmt::print("{:<16} {:<20} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>20}\n", d.door, d.light,
+                   100 * d.effect.error, 100 * d.effect.bias, d.effect.points, 100 * d.effect.reference_noise,
+                   d.light_error ? fmt::format("{:.2f} %", 100 * *d.light_error) : "");
 }
 
 nlohmann::ordered_json toJson(const ErrorFigures& f) {
@@ -97,6 +104,15 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
                              {"points", s.effect.points},
                              {"reference_noise", s.effect.reference_noise},
                              {"energy_dropped", s.energy_dropped}});
+    for (const DoorReport& d : r.doors) {
+        j["doors"].push_back({{"door", d.door},
+                              {"light", d.light},
+                              {"error", d.effect.error},
+                              {"bias", d.effect.bias},
+                              {"points", d.effect.points},
+                              {"reference_noise", d.effect.reference_noise}});
+        if (d.light_error) j["doors"].back()["light_error"] = *d.light_error;
+    }
     return j;
 }
 
@@ -153,6 +169,8 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_option("--seed", a->options.seed, "of points and paths")->capture_default_str();
     c->add_flag("--no-sets", a->no_sets, "leave out what each light set does alone");
+    c->add_flag("--doors", a->options.doors,
+                "also what opening each door does: to all light, to what is always on, and to each light set alone");
     c->add_flag("--causes", a->options.causes,
                 "tell the error's causes apart, by baking the first passes again (doors closed)");
     c->add_flag("--formats", a->options.formats, "what each colour format and directional model would cost here");

@@ -101,6 +101,13 @@ struct ReferenceTracer::Vertex {
     float area_weight_sum = 0;  // of the emitters, as seen from here
 };
 
+// What all paths from a point have in common.
+struct ReferenceTracer::Start {
+    Vertex vertex;
+    glm::vec3 direct_lux{0};
+    uint32_t seed = 0;
+};
+
 void ReferenceTracer::Sources::add(glm::vec3 position, float source_power, float least_distance_squared) {
     x.push_back(position.x);
     y.push_back(position.y);
@@ -324,20 +331,35 @@ ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t
     return estimate.value();
 }
 
-void ReferenceTracer::refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const {
-    Vertex start;
+ReferenceTracer::Start ReferenceTracer::startAt(const ReferencePoint& point) const {
+    Start start;
     const bool on_surface = point.surface != glm::vec3(0);
-    start.point = point.position_m + (on_surface ? point.surface : point.normal) * start_offset_m;
-    start.normal = point.normal;
-    start.horizon = point.surface;
-    const glm::vec3 direct = directPart(start);
+    start.vertex.point = point.position_m + (on_surface ? point.surface : point.normal) * start_offset_m;
+    start.vertex.normal = point.normal;
+    start.vertex.horizon = point.surface;
+    start.direct_lux = directPart(start.vertex);
     // By place: the errors of two points are independent. Not by state: differences between states have less noise.
-    const uint32_t seed = hashOf(point.normal, hashOf(point.position_m, options_.seed));
+    start.seed = hashOf(point.normal, hashOf(point.position_m, options_.seed));
+    return start;
+}
+
+glm::vec3 ReferenceTracer::tracePath(const Start& start, uint32_t number, std::vector<float>& weights) const {
+    Path path{hash(start.seed, number), weights};
+    return start.direct_lux + trace(start.vertex, path);
+}
+
+void ReferenceTracer::refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const {
+    const Start start = startAt(point);
     std::vector<float> weights;
-    for (uint32_t i = 0; i < paths; ++i) {
-        Path path{hash(seed, estimate.paths()), weights};
-        estimate.add(direct + trace(start, path));
-    }
+    for (uint32_t i = 0; i < paths; ++i) estimate.add(tracePath(start, estimate.paths(), weights));
+}
+
+void ReferenceTracer::refineDifference(ReferenceEstimate& estimate, const ReferenceTracer& other,
+                                       const ReferencePoint& point, uint32_t paths) const {
+    const Start here = startAt(point), there = other.startAt(point);
+    std::vector<float> weights;
+    for (uint32_t i = 0; i < paths; ++i)
+        estimate.add(tracePath(here, estimate.paths(), weights) - other.tracePath(there, estimate.paths(), weights));
 }
 
 }  // namespace dimmer::cook

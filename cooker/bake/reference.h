@@ -62,10 +62,15 @@ class ReferenceTracer {
     ReferenceValue irradiance(const ReferencePoint& point, uint32_t paths) const;
     // Goes on where `estimate` of the same point stands: the outcome depends on the sum of paths alone.
     void refine(ReferenceEstimate& estimate, const ReferencePoint& point, uint32_t paths) const;
+    // The same of the light that this one finds and `other` does not, path by path: both have the same random numbers
+    // where their seeds are the same, so that the noise of what both find cancels.
+    void refineDifference(ReferenceEstimate& estimate, const ReferenceTracer& other, const ReferencePoint& point,
+                          uint32_t paths) const;
 
    private:
     struct Path;
     struct Vertex;
+    struct Start;
     // Sources of one kind as arrays, so that weighing all of them is one vectorised loop.
     struct Sources {
         std::vector<float> x, y, z, power, least_distance2;
@@ -93,6 +98,8 @@ class ReferenceTracer {
     glm::vec3 areaLight(const Vertex& vertex, Path& path) const;
     float areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const;
     glm::vec3 trace(Vertex vertex, Path& path) const;
+    Start startAt(const ReferencePoint& point) const;
+    glm::vec3 tracePath(const Start& start, uint32_t number, std::vector<float>& weights) const;
 
     const RayScene& rays_;
     ReferenceOptions options_;

@@ -8,7 +8,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr double significant_errors = 3;
 // Of a normal distribution with standard deviation 1: the mean and the 95th percentile of its magnitude.
 const double normal_mean_magnitude = std::sqrt(2 / std::numbers::pi);
 constexpr double normal_p95_magnitude = 1.959964;

@@ -27,8 +27,11 @@ struct ErrorFigures {
 inline constexpr double floor_share = 0.01;
 ErrorFigures lightError(std::span<const LightPair> pairs, double floor_lux);
 
+// A reference closer to nothing than that many of its standard errors may be nothing.
+inline constexpr double significant_errors = 3;
+
 // What a light set or a door does: pairs hold dE, the light with it minus the light without. Over the points where
-// |dE_ref| exceeds three standard errors. A baker that ignores the element scores 1.
+// |dE_ref| exceeds significant_errors. A baker that ignores the element scores 1.
 struct EffectFigures {
     double error = 0;  // sum |dE - dE_ref| / sum |dE_ref|, reference noise taken off in quadrature
     double bias = 0;   // sum (dE - dE_ref) / sum |dE_ref|

@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer::cook {
 namespace {
@@ -49,7 +50,7 @@ bool enough(const ReferenceEstimate& estimate, const ReferenceTarget& target) {
     if (estimate.paths() >= target.paths_max) return true;
     const ReferenceValue v = estimate.value();
     return static_cast<double>(v.luminance_error_lux) <=
-           target.relative * (static_cast<double>(luminance(v.irradiance_lux)) + target.floor_lux);
+           target.relative * (std::abs(static_cast<double>(luminance(v.irradiance_lux))) + target.floor_lux);
 }
 
 }  // namespace
@@ -88,18 +89,25 @@ Scene sceneInState(Scene scene, const ReferenceState& state) {
     return scene;
 }
 
-void refineAll(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, const ReferenceTarget& target,
-               std::span<ReferenceEstimate> estimates, Progress& progress) {
-    tbb::parallel_for(tbb::blocked_range<size_t>(0, points.size(), 1), [&](const auto& range) {
+void refineEach(const RefinePoint& refine, const ReferenceTarget& target, std::span<ReferenceEstimate> estimates,
+                Progress& progress) {
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, estimates.size(), 1), [&](const auto& range) {
         for (size_t i = range.begin(); i < range.end(); ++i)
             while (!enough(estimates[i], target)) {
                 const uint32_t so_far = estimates[i].paths();
                 const uint32_t more = std::max(target.paths_min > so_far ? target.paths_min - so_far : 0, so_far / 2);
-                tracer.refine(estimates[i], points[i],
-                              std::min(std::max(more, 1u), std::max(target.paths_max, target.paths_min) - so_far));
+                refine(i, estimates[i],
+                       std::min(std::max(more, 1u), std::max(target.paths_max, target.paths_min) - so_far));
             }
         progress.advance(range.size());
     });
+}
+
+void refineAll(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, const ReferenceTarget& target,
+               std::span<ReferenceEstimate> estimates, Progress& progress) {
+    refineEach(
+        [&](size_t i, ReferenceEstimate& estimate, uint32_t paths) { tracer.refine(estimate, points[i], paths); },
+        target, estimates, progress);
 }
 
 }  // namespace dimmer::cook

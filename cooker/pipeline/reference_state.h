@@ -4,6 +4,7 @@
 #include <bake/progress.h>
 #include <bake/reference.h>
 
+#include <functional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -23,7 +24,7 @@ Expected<ReferenceState> readReferenceState(const Scene& scene, std::string_view
 // The level as it stands: open doors are gone, or in their open poses.
 Scene sceneInState(Scene scene, const ReferenceState& state);
 
-// When a point has had enough paths: once the standard error of its luminance is at most `relative` * (E + floor).
+// When a point has had enough paths: once the standard error of its luminance is at most `relative` * (|E| + floor).
 struct ReferenceTarget {
     uint32_t paths_min = 256;  // fewer give no trustworthy error
     uint32_t paths_max = 16384;
@@ -34,5 +35,9 @@ struct ReferenceTarget {
 // Refines every estimate until the target is met; on all cores, the same result on any number of them.
 void refineAll(const ReferenceTracer& tracer, std::span<const ReferencePoint> points, const ReferenceTarget& target,
                std::span<ReferenceEstimate> estimates, Progress& progress);
+// The same with paths of any kind: refine(i, estimates[i], paths) adds so many.
+using RefinePoint = std::function<void(size_t, ReferenceEstimate&, uint32_t)>;
+void refineEach(const RefinePoint& refine, const ReferenceTarget& target, std::span<ReferenceEstimate> estimates,
+                Progress& progress);
 
 }  // namespace dimmer::cook

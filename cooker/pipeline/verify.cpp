@@ -6,6 +6,7 @@
 #include <format/texel.h>
 #include <pipeline/dissect.h>
 #include <pipeline/measured_light.h>
+#include <pipeline/verify_doors.h>
 #include <pipeline/verify_models.h>
 #include <probes/free_space.h>
 
@@ -88,13 +89,6 @@ glm::vec3 tiltedNormal(glm::vec2 u) {
     const float cos_max = std::cos(tilt_max_deg * pi / 180);
     const float z = 1 - u.x * (1 - cos_max), radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
     return {radius * std::cos(phi), radius * std::sin(phi), z};
-}
-
-std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool tilted) {
-    std::vector<ReferencePoint> out;
-    for (const VerifyPoint& p : points)
-        out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal, p.frame.normal});
-    return out;
 }
 
 bool reached(const ErrorFigures& f) {
@@ -249,6 +243,13 @@ std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, co
     return points;
 }
 
+std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool tilted) {
+    std::vector<ReferencePoint> out;
+    for (const VerifyPoint& p : points)
+        out.push_back({p.position_m, tilted ? p.tilted : p.frame.normal, p.frame.normal});
+    return out;
+}
+
 Expected<std::vector<double>> packLight(const Pack& pack, std::span<const VerifyPoint> points, bool tilted,
                                         std::string_view text) {
     CpuRuntime runtime(pack);
@@ -343,6 +344,11 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     if (auto ok = dissect(scene, pack, options, *state, progress, report); !ok) return std::unexpected(ok.error());
     if (options.sets)
         if (auto ok = verifySets(scene, pack, options, progress, report); !ok) return std::unexpected(ok.error());
+    if (options.doors) {
+        auto doors = verifyDoors(scene, pack, options, *state, progress);
+        if (!doors) return std::unexpected(doors.error());
+        report.doors = std::move(*doors);
+    }
     progress.finish();
     return report;
 }

@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,9 @@ inline constexpr float tilt_max_deg = 60;
 std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, const std::vector<bool>& door_open,
                                       uint32_t count, uint32_t seed);
 
+// The same places for the reference, own or tilted normal.
+std::vector<ReferencePoint> queries(std::span<const VerifyPoint> points, bool tilted);
+
 // Luminance in lux at every point, own or tilted normal, in the pack's state `text`.
 Expected<std::vector<double>> packLight(const Pack& pack, std::span<const VerifyPoint> points, bool tilted,
                                         std::string_view text);
@@ -48,6 +52,7 @@ struct VerifyOptions {
     uint32_t paths_max = 16384;  // per point
     uint32_t seed = 1;
     bool sets = true;      // also what each light set does
+    bool doors = false;    // also what opening each door does (see verify_doors.h)
     bool causes = false;   // also where the error comes from (see dissect.h); closed doors only
     bool formats = false;  // also what each way to store a texel costs here
 };
@@ -56,6 +61,15 @@ struct SetReport {
     std::string name;
     EffectFigures effect;
     double energy_dropped = 0;  // share that fell below the activity threshold, as the pack states it
+};
+
+// What opening a door does to some of the light.
+struct DoorReport {
+    std::string door;
+    std::string light;  // "all" of the state; "always on"; or the name of a light set, alone
+    EffectFigures effect;
+    // Of "all": sum |E - E_ref| / sum E_ref with the door open, at the same places, those that change most in majority.
+    std::optional<double> light_error;
 };
 
 // One of the places behind the figures.
@@ -81,6 +95,7 @@ struct VerifyReport {
     std::map<std::string, double> causes;  // mean error by cause
     std::vector<FormatError> formats;
     std::vector<SetReport> sets;
+    std::vector<DoorReport> doors;
     std::vector<VerifyPoint> points;
     std::vector<LightPair> surface_pairs;  // per point
     std::vector<MeasuredPlace> places;     // all that was measured, kind after kind

@@ -244,14 +244,23 @@ class Report {
                     body_ += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}\n", where, number(v[where], "mean"),
                                          number(v[where], "p95"), number(v[where], "bias"));
             body_ += "</table></div>\n";
-            if (v.contains("sets") && v["sets"].is_array() && !v["sets"].empty()) {
-                body_ += "<div class=scroll><table><tr><th>light set, alone<th>error<th>bias<th>reference noise\n";
-                for (const nlohmann::json& set : v["sets"])
-                    if (set.is_object() && set.contains("name") && set["name"].is_string())
-                        body_ += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}\n", escaped(set["name"].get<std::string>()),
-                                             number(set, "error"), number(set, "bias"), number(set, "reference_noise"));
+            const auto effects = [&](const char* key, std::string_view header, std::vector<const char*> names) {
+                if (!v.contains(key) || !v[key].is_array() || v[key].empty()) return;
+                body_ += fmt::format("<div class=scroll><table><tr>{}<th>error<th>bias<th>reference noise\n", header);
+                for (const nlohmann::json& row : v[key]) {
+                    const auto named = [&](const char* name) {
+                        return row.is_object() && row.contains(name) && row[name].is_string();
+                    };
+                    if (!std::ranges::all_of(names, named)) continue;
+                    body_ += "<tr>";
+                    for (const char* name : names) body_ += "<td>" + escaped(row[name].get<std::string>());
+                    body_ += fmt::format("<td>{}<td>{}<td>{}\n", number(row, "error"), number(row, "bias"),
+                                         number(row, "reference_noise"));
+                }
                 body_ += "</table></div>\n";
-            }
+            };
+            effects("sets", "<th>light set, alone", {"name"});
+            effects("doors", "<th>door, opened<th>light", {"door", "light"});
         }
         if (input_.heat_maps.empty()) return {};
         body_ += "<h2>Error on the pages</h2>\n<p class=dim>Points: blue too dark, white exact, red too bright.</p>\n";

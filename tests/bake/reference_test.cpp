@@ -217,5 +217,30 @@ TEST(Reference, RefiningIsTheSameAsTracingAtOnce) {
     EXPECT_EQ(once.standard_error_lux, steps.standard_error_lux);
 }
 
+// What one lamp adds to another, far brighter one: the brighter one's noise is in both.
+TEST(Reference, ADifferenceHasTheNoiseOfWhatDiffersAlone) {
+    Scene scene;
+    addBox(scene, glm::vec3(1), addMaterial(scene, lambert(0.5f)));
+    scene.light_sets = {{"bright", 1}, {"faint", 1}};
+    addPointLight(scene, {0.4f, 0.1f, 0}, 1000, BakeMode::Indirect).light_set = 0;
+    addPointLight(scene, {-0.4f, 0.1f, 0}, 1, BakeMode::Indirect).light_set = 1;
+    const RayScene rays(scene);
+    const std::vector<glm::vec3> first = {glm::vec3(1), glm::vec3(0)};
+    const ReferenceTracer both(rays, {}), bright(rays, {.set_weights = first}), faint(rays, onlySet(1, 2));
+    const ReferencePoint place{{0.3f, -1, 0.2f}, up};
+    constexpr uint32_t paths = 4000;
+    ReferenceEstimate difference;
+    for (uint32_t n : {1u, paths - 1}) both.refineDifference(difference, bright, place, n);
+    EXPECT_EQ(difference.paths(), paths);
+    const ReferenceValue d = difference.value(), a = both.irradiance(place, paths), b = bright.irradiance(place, paths);
+    // The same paths: but for the rounding of floats.
+    EXPECT_NEAR(d.irradiance_lux.y, a.irradiance_lux.y - b.irradiance_lux.y, 1e-5f * a.irradiance_lux.y);
+    EXPECT_LT(d.luminance_error_lux, 0.1f * std::hypot(a.luminance_error_lux, b.luminance_error_lux));
+    const ReferenceValue alone = faint.irradiance(place, paths);
+    const float noise = std::hypot(d.luminance_error_lux, alone.luminance_error_lux);
+    EXPECT_LT(noise, 0.2f * alone.irradiance_lux.y);
+    EXPECT_NEAR(luminance(d.irradiance_lux), luminance(alone.irradiance_lux), 4 * noise);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test
