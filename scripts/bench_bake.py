@@ -185,11 +185,13 @@ def openings_table(points, paths, folder):
         dimmer("cook", level, "-o", pack, "--quality", "final", "--profile", HOUSE_PROFILE, "--set", "grids.global=off")
         dimmer("verify", level, pack, "--points", points, "--paths", paths, "--no-sets", "--doors", "--json", report)
         for d in json.loads(report.read_text())["doors"]:
-            rows.append([name, d["door"], d["light"], percent(d["error"]), f"{100 * d['bias']:+.2f} %",
-                         percent(d["reference_noise"]), str(d["points"]),
-                         percent(d["light_error"]) if "light_error" in d else ""])
+            there = d.get("light_there")
+            rows.append([name, d["door"], d["light"], f"{100 * d['error']:.1f} ± {100 * d['sampling_error']:.1f} %",
+                         f"{100 * d['bias']:+.1f} %", f"{100 * d['reference_noise']:.1f} %",
+                         f"{100 * d['elsewhere']:.1f} %", str(d["points"]), f"{100 * there['error']:.1f} %" if there else ""])
             print(*rows[-1], flush=True)
-    return table(["the house with", "door", "light", "error", "bias", "reference noise", "points", "light there"], rows)
+    return table(["the house with", "door", "light", "error", "bias", "reference noise", "elsewhere", "points",
+                  "light there"], rows)
 
 
 def house_variant(folder, name, rename):
@@ -284,11 +286,14 @@ def doors_table(folder, runs):
     return table(["quality", "the house with", "CPU s", "per door", "rays", "records"], rows)
 
 
-def refresh(topic, text):
+def refresh(topic, measure):
+    """Puts what measure() returns between the page's markers; asks for the markers first, as it may take an hour."""
     begin, end = f"<!-- {topic}: begin -->", f"<!-- {topic}: end -->"
     page = PAGE.read_text()
     if begin not in page or end not in page:
         raise SystemExit(f"{PAGE}: the markers of '{topic}' are missing")
+    text = measure()
+    page = PAGE.read_text()
     head, tail = page[:page.index(begin)], page[page.index(end):]
     PAGE.write_text(f"{head}{begin}\n{text}\n{tail}")
 
@@ -308,29 +313,30 @@ def main():
         print("the levels with given irradiance are not here: the house alone is measured")
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
+        def part(name, *more):
+            return " ".join([f"`scripts/bench bake --only {name}", *more]) + "`\n\n"
+
+        runs = f"--runs {options.runs}"
         if options.only in (None, "sets"):
-            refresh("sets", f"`scripts/bench bake --only sets --runs {options.runs}`\n\n"
-                    + sets_table(folder, options.runs))
+            refresh("sets", lambda: part("sets", runs) + sets_table(folder, options.runs))
         if options.only in (None, "doors"):
-            refresh("doors", f"`scripts/bench bake --only doors --runs {options.runs}`\n\n"
-                    + doors_table(folder, options.runs))
+            refresh("doors", lambda: part("doors", runs) + doors_table(folder, options.runs))
+        paths = [f"--points {options.points}", f"--verify-paths {options.verify_paths}"]
         if options.only in (None, "openings"):
-            refresh("openings", f"`scripts/bench bake --only openings --points {options.points} "
-                    f"--verify-paths {options.verify_paths}`\n\n"
+            refresh("openings", lambda: part("openings", *paths)
                     + openings_table(options.points, options.verify_paths, folder))
         if levels and options.only in (None, "reference"):
-            refresh("reference", f"`scripts/bench bake --only reference --paths {options.paths}`\n\n"
+            refresh("reference", lambda: part("reference", f"--paths {options.paths}")
                     + reference_table(levels, options.paths, folder))
+        quality = f"--quality {options.quality}"
         if levels and options.only in (None, "packs"):
-            errors, effects = pack_tables(levels, options.quality, folder)
-            refresh(f"packs {options.quality}", f"`scripts/bench bake --only packs --quality {options.quality}`\n\n"
-                    f"{errors}\n\n{effects}")
+            refresh(f"packs {options.quality}", lambda: part("packs", quality)
+                    + "\n\n".join(pack_tables(levels, options.quality, folder)))
         if options.only in (None, "verify"):
             measured = [("house", HOUSE, "desktop"), ("house, own profile", HOUSE, HOUSE_PROFILE)]
             measured += [(n, LEVELS / f"{n}.glb", "desktop") for n in levels if n == "two_rooms"]
-            tables = verify_tables(measured, options.quality, options.points, options.verify_paths, folder)
-            refresh(f"verify {options.quality}", f"`scripts/bench bake --only verify --quality {options.quality} "
-                    f"--points {options.points} --verify-paths {options.verify_paths}`\n\n" + "\n\n".join(tables))
+            refresh(f"verify {options.quality}", lambda: part("verify", quality, *paths) + "\n\n".join(
+                verify_tables(measured, options.quality, options.points, options.verify_paths, folder)))
 
 
 if __name__ == "__main__":

@@ -289,7 +289,7 @@ def main():
                              grids_of(level), level.results.get("causes", {})) for level in levels],
                            {name: key_of(c) for name, c in profiles().items()}))
     counts = ", ".join(f"{level.name} {len(lightmap_results(level))}" for level in levels)
-    refresh("pareto", f"`scripts/bench pareto --quality {options.quality}`; configurations measured, of "
+    refresh("pareto", lambda: f"`scripts/bench pareto --quality {options.quality}`; configurations measured, of "
             f"{len(configurations())} each: {counts}\n\n" + front_table(levels) + "\n\n" + grid_table(levels))
     print(f"Report: {page}")
 

@@ -21,6 +21,22 @@ struct VerifyArguments {
     bool no_sets = false;
 };
 
+std::string_view lightOf(const DoorReport& d) {
+    switch (d.light) {
+        case DoorReport::Light::All:
+            return "all";
+        case DoorReport::Light::AlwaysOn:
+            return "always on";
+        case DoorReport::Light::Set:
+            return d.light_set;
+    }
+    return "";
+}
+
+std::string shareWithError(const EffectFigures& f) {
+    return f.points == 0 ? "-" : fmt::format("{:.2f} +- {:.2f} %", 100 * f.error, 100 * f.sampling_error);
+}
+
 void printReport(const VerifyReport& r, const VerifyOptions& options) {
     fmt::print("{:<22} {:>8} {:>8} {:>8} {:>8} {:>16}\n", "points", "mean", "p95", "RMSE", "bias", "reference error");
     auto row = [](std::string_view name, const ErrorFigures& f) {
@@ -57,13 +73,19 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
     for (const SetReport& s : r.sets)
         fmt::print("{:<26} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name, 100 * s.effect.error,
                    100 * s.effect.bias, s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
+    if (options.doors && r.doors.empty()) fmt::print("\ndoors: the level has none that the state leaves closed\n");
     if (!r.doors.empty())
-        fmt::print("\n{:<16} {:<20} {:>8} {:>8} {:>8} {:>10} {:>20}\n", "door, opened", "light", "error", "bias",
-                   "points", "ref. noise", "light there, error");
+        fmt::print("\n{:<16} {:<20} {:>17} {:>8} {:>8} {:>10} {:>10} {:>18}\n", "door, opened", "light", "error",
+                   "bias", "points", "ref. noise", "elsewhere", "light there, error");
     for (const DoorReport& d : r.doors)
-        fmt::print("{:<16} {:<20} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>20}\n", d.door, d.light,
-                   100 * d.effect.error, 100 * d.effect.bias, d.effect.points, 100 * d.effect.reference_noise,
-                   d.light_error ? fmt::format("{:.2f} %", 100 * *d.light_error) : "");
+        fmt::print("{:<16} {:<20} {:>17} {:>+6.2f} % {:>8} {:>8.2f} % {:>8.2f} % {:>18}\n", d.door, lightOf(d),
+                   shareWithError(d.effect), 100 * d.effect.bias, d.effect.points, 100 * d.effect.reference_noise,
+                   100 * d.effect.elsewhere, d.light_there ? shareWithError(*d.light_there) : "");
+    if (!r.doors.empty())
+        fmt::print(
+            "error: sum |dE - dE_ref| / sum |dE_ref| where dE_ref is surely not 0, and its standard error by the "
+            "choice "
+            "of places;\nelsewhere: the same sum where dE_ref may be 0 and the pack is surely wrong\n");
 }
 
 nlohmann::ordered_json toJson(const ErrorFigures& f) {
@@ -74,6 +96,15 @@ nlohmann::ordered_json toJson(const ErrorFigures& f) {
             {"measured_mean", f.measured_mean},
             {"reference_relative_standard_error", f.reference_error_mean},
             {"points", f.points}};
+}
+
+nlohmann::ordered_json toJson(const EffectFigures& f) {
+    return {{"error", f.error},
+            {"bias", f.bias},
+            {"points", f.points},
+            {"reference_noise", f.reference_noise},
+            {"sampling_error", f.sampling_error},
+            {"elsewhere", f.elsewhere}};
 }
 
 nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& options) {
@@ -97,21 +128,19 @@ nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& option
                                 {"sets", f.sets},
                                 {"mean", f.mean},
                                 {"p95", f.p95}});
-    for (const SetReport& s : r.sets)
-        j["sets"].push_back({{"name", s.name},
-                             {"error", s.effect.error},
-                             {"bias", s.effect.bias},
-                             {"points", s.effect.points},
-                             {"reference_noise", s.effect.reference_noise},
-                             {"energy_dropped", s.energy_dropped}});
+    for (const SetReport& s : r.sets) {
+        nlohmann::ordered_json set = {{"name", s.name}};
+        set.update(toJson(s.effect));
+        set["energy_dropped"] = s.energy_dropped;
+        j["sets"].push_back(set);
+    }
+    if (options.doors) j["doors"] = nlohmann::ordered_json::array();
     for (const DoorReport& d : r.doors) {
-        j["doors"].push_back({{"door", d.door},
-                              {"light", d.light},
-                              {"error", d.effect.error},
-                              {"bias", d.effect.bias},
-                              {"points", d.effect.points},
-                              {"reference_noise", d.effect.reference_noise}});
-        if (d.light_error) j["doors"].back()["light_error"] = *d.light_error;
+        nlohmann::ordered_json door = {
+            {"door", d.door}, {"light", lightOf(d)}, {"is_light_set", d.light == DoorReport::Light::Set}};
+        door.update(toJson(d.effect));
+        if (d.light_there) door["light_there"] = toJson(*d.light_there);
+        j["doors"].push_back(door);
     }
     return j;
 }

@@ -55,12 +55,19 @@ ErrorFigures lightError(std::span<const LightPair> pairs, double floor_lux) {
 
 EffectFigures effectError(std::span<const LightPair> pairs) {
     EffectFigures out;
-    double difference = 0, magnitude = 0, noise = 0;
+    double difference = 0, magnitude = 0, noise = 0, elsewhere = 0;
+    const auto counts = [](const LightPair& p) {
+        return std::abs(p.reference_lux) > significant_errors * p.reference_error_lux;
+    };
     for (const LightPair& p : pairs) {
-        if (!(std::abs(p.reference_lux) > significant_errors * p.reference_error_lux)) continue;
+        const double d = p.value_lux - p.reference_lux;
+        if (!counts(p)) {
+            if (std::abs(d) > significant_errors * p.reference_error_lux) elsewhere += std::abs(d);
+            continue;
+        }
         ++out.points;
-        difference += p.value_lux - p.reference_lux;
-        magnitude += std::abs(p.value_lux - p.reference_lux);
+        difference += d;
+        magnitude += std::abs(d);
         noise += normal_mean_magnitude * p.reference_error_lux;
         out.reference_sum_lux += std::abs(p.reference_lux);
     }
@@ -69,6 +76,15 @@ EffectFigures effectError(std::span<const LightPair> pairs) {
     out.reference_noise = noise / out.reference_sum_lux;
     out.error = withoutNoise(out.measured_error, out.reference_noise);
     out.bias = difference / out.reference_sum_lux;
+    out.elsewhere = elsewhere / out.reference_sum_lux;
+    // Of a ratio of sums, to first order.
+    double squares = 0;
+    for (const LightPair& p : pairs)
+        if (counts(p)) {
+            const double r = std::abs(p.value_lux - p.reference_lux) - out.measured_error * std::abs(p.reference_lux);
+            squares += r * r;
+        }
+    out.sampling_error = std::sqrt(squares) / out.reference_sum_lux;
     return out;
 }
 

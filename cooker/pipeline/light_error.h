@@ -31,11 +31,14 @@ ErrorFigures lightError(std::span<const LightPair> pairs, double floor_lux);
 inline constexpr double significant_errors = 3;
 
 // What a light set or a door does: pairs hold dE, the light with it minus the light without. Over the points where
-// |dE_ref| exceeds significant_errors. A baker that ignores the element scores 1.
+// |dE_ref| exceeds significant_errors. A baker that ignores the element scores 1. Points may stand for areas: with all
+// three of a pair multiplied by its own.
 struct EffectFigures {
     double error = 0;  // sum |dE - dE_ref| / sum |dE_ref|, reference noise taken off in quadrature
     double bias = 0;   // sum (dE - dE_ref) / sum |dE_ref|
     double measured_error = 0, reference_noise = 0;
+    double sampling_error = 0;  // standard error of measured_error: other points would give another
+    double elsewhere = 0;  // sum |dE - dE_ref| / the same sum where dE_ref may be nothing and dE surely is not dE_ref
     double reference_sum_lux = 0;
     size_t points = 0;  // that count
 };

@@ -65,11 +65,13 @@ struct SetReport {
 
 // What opening a door does to some of the light.
 struct DoorReport {
+    enum class Light { All, AlwaysOn, Set };
     std::string door;
-    std::string light;  // "all" of the state; "always on"; or the name of a light set, alone
+    Light light = Light::All;  // all of the state; what is always on; one light set alone
+    std::string light_set;
     EffectFigures effect;
-    // Of "all": sum |E - E_ref| / sum E_ref with the door open, at the same places, those that change most in majority.
-    std::optional<double> light_error;
+    // Of all light: what is there with the door open, at the same places, of which most are where it changes most.
+    std::optional<EffectFigures> light_there;
 };
 
 // One of the places behind the figures.

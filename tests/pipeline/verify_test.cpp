@@ -55,6 +55,28 @@ TEST(EffectError, IgnoringAnElementScoresOne) {
     EXPECT_NEAR(f.measured_error, 1, 1e-12);
     EXPECT_NEAR(f.bias, -5.0 / 15, 1e-12);
     EXPECT_EQ(effectError({}).points, 0u);
+    EXPECT_NEAR(f.elsewhere, 6.8 / 15, 1e-12);
+}
+
+// The standard error of a ratio of sums, against the spread over many draws.
+TEST(EffectError, KnowsHowMuchOtherPointsWouldSay) {
+    std::mt19937 random(5);
+    std::lognormal_distribution<double> light(0, 1);
+    std::normal_distribution<double> wrong(0, 0.2);
+    double mean = 0, squares = 0, said = 0;
+    constexpr int draws = 2000;
+    for (int i = 0; i < draws; ++i) {
+        std::vector<LightPair> pairs;
+        for (int k = 0; k < 200; ++k) {
+            const double lux = light(random);
+            pairs.push_back({lux * (1 + wrong(random)), lux, 0});
+        }
+        const EffectFigures f = effectError(pairs);
+        mean += f.measured_error / draws;
+        squares += f.measured_error * f.measured_error / draws;
+        said += f.sampling_error / draws;
+    }
+    EXPECT_NEAR(said, std::sqrt(squares - mean * mean), 0.1 * said);  // to first order in 1 / points
 }
 
 // A furnace: E = pi L / (1 - rho) for every place and normal, so that what verify reports is the pack's doing.
