@@ -145,7 +145,9 @@ int run(const CookArguments& a) {
         options.cache.clear();
     else if (options.cache.empty())
         options.cache = defaultCache(options.pack);
-    auto result = cook(options, *progress);
+    std::vector<std::string> warnings;
+    auto result = cook(options, *progress, &warnings);
+    for (const std::string& w : warnings) sayMessage("warning: " + w);
     if (!result) return reportError(result.error());
     if (!a.write_level.empty())
         if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)

@@ -39,7 +39,7 @@ class KeyBuilder {
     // Arrays of what holds nothing but numbers.
     template <class T>
     KeyBuilder& addArray(std::span<const T> values) {
-        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0 && alignof(T) == 4);
+        static_assert(std::is_trivially_copyable_v<T> && sizeof(T) % 4 == 0 && alignof(T) <= 4);
         add(uint64_t{values.size()});
         return addBytes(values.data(), values.size_bytes());
     }

@@ -25,12 +25,17 @@ void addSurface(KeyBuilder& key, const Material& m) {
     key.add(m.name);
     add(key, m.base_color);
     key.add(m.metallic).add(m.specular).add(m.alpha).add(m.alpha_mode).add(m.alpha_cutoff);
-    key.add(uint32_t{m.double_sided}).addOptional(m.base_color_image);
+    key.add(uint32_t{m.double_sided}).addOptional(m.base_color_texture);
 }
 
 void addImage(KeyBuilder& key, const Image& image) {
     key.add(image.width).add(image.height);
     addAll(key, image.texels);
+}
+
+void addTexture(KeyBuilder& key, const Texture& texture) {
+    key.add(texture.width).add(texture.height).add(texture.transfer);
+    addAll(key, texture.texels);
 }
 
 void addMesh(KeyBuilder& key, const SceneMesh& mesh) {
@@ -82,8 +87,8 @@ Key geometryKey(const Scene& scene) {
     KeyBuilder key("geometry");
     key.add(uint64_t{scene.materials.size()});
     for (const Material& m : scene.materials) addSurface(key, m);
-    key.add(uint64_t{scene.images.size()});
-    for (const Image& image : scene.images) addImage(key, image);
+    key.add(uint64_t{scene.textures.size()});
+    for (const auto& texture : scene.textures) addTexture(key, *texture);
     key.add(uint64_t{scene.meshes.size()});
     for (const SceneMesh& mesh : scene.meshes) addMesh(key, mesh);
     key.add(uint64_t{scene.models.size()});

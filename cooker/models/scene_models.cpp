@@ -138,13 +138,26 @@ void listModels(Scene& scene, const ModelSettings& settings) {
     }
 }
 
+namespace {
+
+// Relative to itself: integer positions (KHR_mesh_quantization) have scales below 0.0001.
+std::pair<int, long> roundedScale(float scale) {
+    constexpr float tenth_of_a_permille = 1e4f;
+    int exponent = 0;
+    const long mantissa = std::lround(std::frexp(scale, &exponent) * tenth_of_a_permille);
+    constexpr long one = 10000;
+    if (std::abs(mantissa) == one) return {exponent + 1, mantissa / 2};
+    return {exponent, mantissa};
+}
+
+}  // namespace
+
 std::optional<ModelShape> shapeOf(const Scene& scene, const SceneModel& model) {
     if (model.meshes.empty() || !model.is_instance_shape) return {};
     ModelShape shape;
     shape.gltf_mesh = scene.meshes[model.meshes[0]].gltf_mesh;
     if (shape.gltf_mesh < 0) return {};
-    constexpr float tenth_of_a_permille = 1e4f;
-    for (int i = 0; i < 3; ++i) shape.scale[static_cast<size_t>(i)] = std::lround(model.scale[i] * tenth_of_a_permille);
+    for (int i = 0; i < 3; ++i) shape.scale[static_cast<size_t>(i)] = roundedScale(model.scale[i]);
     for (const uint32_t m : model.meshes) {
         shape.materials.push_back(scene.meshes[m].triangle_materials);
         shape.vertices.push_back(scene.meshes[m].positions_m.size());

@@ -26,7 +26,7 @@ void listModels(Scene& scene, const ModelSettings& settings);
 // What makes nodes' models alike but for where they stand: the file's mesh, its size and what it is made of.
 struct ModelShape {
     int gltf_mesh = -1;
-    std::array<long, 3> scale{};  // in tenths of a permille
+    std::array<std::pair<int, long>, 3> scale{};  // exponent, and mantissa in tenths of a permille
     std::vector<std::vector<uint32_t>> materials;
     std::vector<size_t> vertices;  // of what import has left of each mesh
     auto operator<=>(const ModelShape&) const = default;

@@ -23,7 +23,7 @@ constexpr float lift_share = 1e-3f, lift_min_m = 1e-4f;
 Scene alone(const Scene& scene, const SceneModel& model) {
     Scene out;
     out.materials = scene.materials;
-    out.images = scene.images;
+    out.textures = scene.textures;
     for (const uint32_t m : model.meshes) {
         out.meshes.push_back(scene.meshes[m]);
         out.meshes.back().lighting = Lighting::Lightmap;

@@ -78,14 +78,18 @@ PackCost costOf(const PackData& pack) {
         cost.meshes += m.vertices.size() * sizeof(MeshVertex) + m.indices.size() * sizeof(uint32_t);
     for (const ModelMesh& m : pack.model_meshes)
         cost.meshes += m.vertices.size() * sizeof(ModelVertex) + m.indices.size() * sizeof(uint32_t);
+    const std::vector<uint32_t>& probe_records = pack.probes.record_counts;
     for (uint32_t e = 0; e < pack.elements.size(); ++e) {
-        ElementCost element{e, 0, 0};
-        for (const Contribution& c : pack.contributions) {
+        ElementCost element{.element = e};
+        for (size_t k = 0; k < pack.contributions.size(); ++k) {
+            const Contribution& c = pack.contributions[k];
             const bool holds = c.light_set == e || std::ranges::count(c.doors_open, e) > 0 ||
                                std::ranges::count(c.doors_closed, e) > 0;
-            if (holds) element.receivers += c.receivers;
+            if (!holds) continue;
+            element.receivers += c.receivers;
+            if (!probe_records.empty()) element.probe_bytes += probe_records[k] * sizeof(ProbeRecord);
         }
-        element.bytes = element.receivers * record_bytes;
+        element.bytes = element.receivers * record_bytes + element.probe_bytes;
         cost.elements.push_back(element);
     }
     cost.overlap_histogram.assign(1, pack.base_pages.size() - receivers);

@@ -11,8 +11,10 @@
 namespace dimmer::cook {
 
 struct ElementCost {
-    uint32_t element = 0;  // index into PackData::elements
-    uint64_t receivers = 0, bytes = 0;
+    uint32_t element = 0;    // index into PackData::elements
+    uint64_t receivers = 0;  // texels
+    uint64_t bytes = 0;      // of the records of texels and probes
+    uint64_t probe_bytes = 0;
 };
 
 // Device memory in bytes.

@@ -4,6 +4,7 @@
 #include <pipeline/level_meshes.h>
 #include <pipeline/prepare_scene.h>
 #include <pipeline/profile.h>
+#include <pipeline/set_scales.h>
 
 #include <fmt/format.h>
 
@@ -29,6 +30,7 @@ Expected<std::unique_ptr<ChartedLevel>> chartAgain(const std::filesystem::path& 
     if (!imported) return std::unexpected(imported.error());
     auto charted = std::make_unique<ChartedLevel>();
     charted->scene = std::move(*imported);
+    charted->copy_of = divideByScales(charted->scene).copy_of;
     prepareScene(charted->scene, settings->profile);
     cutAtWalls(charted->scene, settings->profile.texels_per_metre);
     charted->rays = std::make_unique<RayScene>(charted->scene);

@@ -10,7 +10,8 @@
 namespace dimmer::cook {
 
 struct ChartedLevel {
-    Scene scene;                     // cut at walls, with open leaves
+    Scene scene;                     // as it is baked: cut at walls, with open leaves, materials of sets copied
+    std::vector<uint32_t> copy_of;   // see SetScales
     std::unique_ptr<RayScene> rays;  // over `scene`
     Unwrap charts;
 };

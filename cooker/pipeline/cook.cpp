@@ -237,26 +237,38 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
     return settings;
 }
 
-Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set) {
+Expected<std::vector<std::string>> resolveSettings(Profile& profile, const Scene& scene,
+                                                   const std::vector<std::string>& set) {
     std::istringstream texts(scene.settings);
     for (std::string text; std::getline(texts, text, ',');) {
         text.erase(0, text.find_first_not_of(' '));
         text.erase(text.find_last_not_of(' ') + 1);
         if (text.empty()) continue;
-        if (auto ok = assignText(profile, text, scene.file + ": scene: 'dimmer_settings'", "level"); !ok) return ok;
+        if (auto ok = assignText(profile, text, scene.file + ": scene: 'dimmer_settings'", "level"); !ok)
+            return std::unexpected(ok.error());
     }
     for (const std::string& text : set)
-        if (auto ok = assignText(profile, text, "--set", "command line"); !ok) return ok;
+        if (auto ok = assignText(profile, text, "--set", "command line"); !ok) return std::unexpected(ok.error());
     std::vector<std::string_view> names;
     for (const SceneLightSet& s : scene.light_sets) names.push_back(s.name);
-    for (const auto& [name, threshold] : profile.set_thresholds) {
-        if (std::ranges::find(names, name) != names.end()) continue;
+    std::vector<std::string> warnings;
+    for (auto own = profile.set_thresholds.begin(); own != profile.set_thresholds.end();) {
+        const std::string& name = own->first;
+        if (std::ranges::find(names, name) != names.end()) {
+            ++own;
+            continue;
+        }
+        const std::string key = std::string(set_threshold_prefix) + name, origin = profile.origin[key];
         const std::string_view nearest = nearestName(name, names);
-        return fail(ErrorCode::BadInput,
-                    fmt::format("{}: '{}{}' names no light set of this level{}", scene.file, set_threshold_prefix, name,
-                                nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+        const std::string what = fmt::format("'{}' names no light set of this level{}", key,
+                                             nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
+        if (origin == "level" || origin == "command line")
+            return fail(ErrorCode::BadInput, fmt::format("{}: {}", scene.file, what));
+        warnings.push_back(fmt::format("{}: {}: {}", scene.file, origin, what));
+        profile.origin.erase(key);
+        own = profile.set_thresholds.erase(own);
     }
-    return {};
+    return warnings;
 }
 
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
@@ -428,7 +440,9 @@ Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOp
 
 }  // namespace
 
-Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
+namespace {
+
+Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress& progress) {
     std::optional<tbb::global_control> limit;
     if (options.threads > 0) limit.emplace(tbb::global_control::max_allowed_parallelism, options.threads);
     auto profile = loadProfile(options.profile);
@@ -438,7 +452,6 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
         quality->light_grid = options.light_grid;
         quality->grid_baseline = options.grid_baseline;
     }
-    CookResult result;
     Expected<Scene> scene;
     {
         Stopwatch watch(result.stats, "import");
@@ -447,7 +460,9 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
     if (!scene) return std::unexpected(scene.error());
     result.stats.warnings = scene->warnings;
     if (options.quality_is_chosen) profile->origin["quality"] = "command line";
-    if (auto ok = resolveSettings(*profile, *scene, options.set); !ok) return std::unexpected(ok.error());
+    const auto unknown = resolveSettings(*profile, *scene, options.set);
+    if (!unknown) return std::unexpected(unknown.error());
+    result.stats.warnings.insert(result.stats.warnings.end(), unknown->begin(), unknown->end());
     result.profile = *profile;
     auto cache = openCache(options, result.stats);
     const auto bytes = findOrMakePack(*scene, options, progress, cache ? &*cache : nullptr, result);
@@ -463,7 +478,17 @@ Expected<CookResult> cook(const CookOptions& options, Progress& progress) {
         if (auto ok = writeFileAtomically(options.pack, *bytes); !ok) return std::unexpected(ok.error());
     }
     result.stats.peak_bytes = peakBytes();
-    return result;
+    return {};
+}
+
+}  // namespace
+
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings) {
+    CookResult result;
+    auto ok = cookInto(result, options, progress);
+    if (ok) return result;
+    if (warnings) *warnings = std::move(result.stats.warnings);
+    return std::unexpected(ok.error());
 }
 
 }  // namespace dimmer::cook

@@ -59,8 +59,10 @@ bool wantsGrid(const Profile& profile, const Scene& scene);
 BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
 
 // The profile as this cook uses it: what it says, then the level's `dimmer_settings`, then "key=value" texts. Names of
-// light sets that the level does not have are errors.
-Expected<void> resolveSettings(Profile& profile, const Scene& scene, const std::vector<std::string>& set);
+// light sets that the level does not have are errors, but for a profile's own, which may be for other levels: they are
+// dropped, and come back as warnings.
+Expected<std::vector<std::string>> resolveSettings(Profile& profile, const Scene& scene,
+                                                   const std::vector<std::string>& set);
 
 struct CookResult {
     PackData pack;
@@ -70,7 +72,8 @@ struct CookResult {
     CookStats stats;
 };
 
-// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written.
-Expected<CookResult> cook(const CookOptions& options, Progress& progress);
+// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written; `warnings`, if given,
+// takes what was to be said until then.
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings = nullptr);
 
 }  // namespace dimmer::cook

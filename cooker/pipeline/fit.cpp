@@ -82,9 +82,10 @@ std::vector<Limit> limitsOf(const PackData& pack, const PackCost& cost, const Pr
         };
         limits.push_back({profile.budget_per_element,
                           [of_element, e](const Rungs& rungs) {
-                              uint64_t bytes = e.bytes;
-                              for (uint32_t g = 0; g < rungs.size(); ++g) bytes -= of_element(g, 0, rungs[g]);
-                              return bytes;
+                              const uint64_t texels = e.bytes - e.probe_bytes;
+                              uint64_t stay = texels;
+                              for (uint32_t g = 0; g < rungs.size(); ++g) stay -= of_element(g, 0, rungs[g]);
+                              return stay + (texels > 0 ? scaled(e.probe_bytes, ratio(stay, texels)) : e.probe_bytes);
                           },
                           of_element});
     }
@@ -176,7 +177,8 @@ std::vector<Share> sharesOver(const PackCost& cost, const Profile& profile, cons
         {profile.budget_base_lightmaps, cost.base_lightmap, 0, 0},
         {profile.budget_dynamic, 0, of_texels, of_probes},
     };
-    for (const ElementCost& e : cost.elements) shares.push_back({profile.budget_per_element, 0, e.bytes, 0});
+    for (const ElementCost& e : cost.elements)
+        shares.push_back({profile.budget_per_element, 0, e.bytes - e.probe_bytes, e.probe_bytes});
     std::erase_if(shares, [](const Share& s) { return !s.over(); });
     return shares;
 }

@@ -32,12 +32,7 @@ class MeshBuilder {
 
 glm::vec3 meanReflectance(const Scene& scene, const Material& material) {
     glm::vec3 color = material.base_color;
-    if (material.base_color_image) {
-        glm::vec4 sum(0);
-        const Image& image = scene.images[*material.base_color_image];
-        for (const glm::vec4& texel : image.texels) sum += texel;
-        if (!image.texels.empty()) color *= glm::vec3(sum) / static_cast<float>(image.texels.size());
-    }
+    if (material.base_color_texture) color *= glm::vec3(scene.textures[*material.base_color_texture]->mean());
     return material.reflectance(color);
 }
 

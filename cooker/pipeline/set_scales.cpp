@@ -64,11 +64,15 @@ SetScales divideByScales(Scene& scene) {
 
     for (PunctualLight& light : scene.lights)
         if (light.light_set) light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);
-    for (const Material& m : scene.materials) scales.emission_cd_m2.push_back(m.emission_cd_m2);
+    for (const Material& m : scene.materials) {
+        scales.copy_of.push_back(static_cast<uint32_t>(scales.copy_of.size()));
+        scales.emission_cd_m2.push_back(m.emission_cd_m2);
+    }
     for (auto& [key, material] : used) {
         if (isShared(scene, material, key.first)) {
             scene.materials.push_back(scene.materials[material]);
             scales.emission_cd_m2.push_back(scales.emission_cd_m2[material]);
+            scales.copy_of.push_back(material);
             material = static_cast<uint32_t>(scene.materials.size() - 1);
         }
         glm::vec3& emission = scene.materials[material].emission_cd_m2;

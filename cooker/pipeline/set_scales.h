@@ -12,6 +12,7 @@ namespace dimmer::cook {
 struct SetScales {
     std::vector<glm::vec3> of_group;        // per light group, linear RGB; 1 for always-on light
     std::vector<glm::vec3> emission_cd_m2;  // per material of the scene, as the level has it
+    std::vector<uint32_t> copy_of;          // per material of the scene, the level's own that it is or is a copy of
 };
 
 // Divides the lamps and emissive surfaces of every light set by the set's scale: per channel the largest punctual

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <tuple>
 
 namespace dimmer::cook {
@@ -120,14 +121,29 @@ class LevelWriter {
         }
     }
 
+    // Which one becomes TEXCOORD_0 is the material's choice; joints and weights go with the skin.
+    static bool isWritten(const std::string& attribute) {
+        return attribute == "POSITION" || attribute == "NORMAL" || attribute.starts_with("TEXCOORD_") ||
+               attribute.starts_with("JOINTS_") || attribute.starts_with("WEIGHTS_");
+    }
+
     // The node's mesh gives way to what will be made of it.
     void release(Json& original, int node) {
         Json& n = original["nodes"][static_cast<size_t>(node)];
         original_mesh_[node] = original["meshes"][n["mesh"].get<size_t>()];
         n.erase("mesh");
-        if (n.contains("skin"))
-            warnings_.push_back(
-                fmt::format("node '{}': its skin is not written; the mesh is in its rest pose", n.value("name", "")));
+        const auto warn = [&](const std::string& what) {
+            warnings_.push_back(fmt::format("node '{}': {}", n.value("name", fmt::format("node_{}", node)), what));
+        };
+        if (n.contains("skin")) warn("its skin is not written; the mesh is in its rest pose");
+        std::set<std::string> lost;
+        for (const Json& primitive : original_mesh_[node]["primitives"]) {
+            for (const auto& attribute : primitive["attributes"].items())
+                if (!isWritten(attribute.key())) lost.insert(attribute.key());
+            if (primitive.contains("targets")) lost.insert("its morph targets");
+        }
+        if (!lost.empty())
+            warn(fmt::format("{} {} not written", fmt::join(lost, ", "), lost.size() > 1 ? "are" : "is"));
         n.erase("skin");
         n.erase("weights");
     }
@@ -206,8 +222,10 @@ class LevelWriter {
 
     // The file's material; a single-sided copy where each side has texels of its own. None: glTF's default.
     std::optional<size_t> materialFor(uint32_t material, bool lit) {
+        const bool double_sided = level_.scene.materials[material].double_sided;
+        material = level_.copy_of[material];
         if (material >= source_.model.materials.size()) return std::nullopt;
-        if (!lit || !level_.scene.materials[material].double_sided) return material;
+        if (!lit || !double_sided) return material;
         const auto [it, fresh] = single_sided_.try_emplace(material, document_.json["materials"].size());
         if (fresh) {
             Json copy = document_.json["materials"][material];
@@ -217,23 +235,47 @@ class LevelWriter {
         return it->second;
     }
 
-    // TEXCOORD_0 is what the base colour's texture wants, with its transform applied.
+    // TEXCOORD_0 is what the base colour's texture wants, with its transform applied; TEXCOORD_1 the lightmap's.
     void normaliseTextures() {
         if (!document_.json.contains("materials")) return;
         for (Json& material : document_.json["materials"]) {
-            if (!material.contains("pbrMetallicRoughness")) continue;
-            Json& pbr = material["pbrMetallicRoughness"];
-            if (!pbr.contains("baseColorTexture")) continue;
-            Json& texture = pbr["baseColorTexture"];
-            texture.erase("texCoord");
-            if (!texture.contains("extensions")) continue;
-            if (texture["extensions"].erase("KHR_texture_transform") > 0)
-                warnings_.push_back(
-                    fmt::format("material '{}': its texture's transform is in TEXCOORD_0 now; textures "
-                                "other than the base colour's may lie elsewhere",
-                                material.value("name", "")));
-            if (texture["extensions"].empty()) texture.erase("extensions");
+            const Json::json_pointer base("/pbrMetallicRoughness/baseColorTexture");
+            size_t wanted = 0;
+            if (material.contains(base)) wanted = normaliseBase(material, material[base]);
+            for (const char* other : {"/pbrMetallicRoughness/metallicRoughnessTexture", "/normalTexture",
+                                      "/occlusionTexture", "/emissiveTexture"})
+                if (const Json::json_pointer place(other); material.contains(place))
+                    if (!followsBase(material[place], wanted))
+                        warnings_.push_back(fmt::format(
+                            "material '{}': {} wants TEXCOORD_{}, which is not written; TEXCOORD_0 is the "
+                            "base colour's now, TEXCOORD_1 the lightmap's",
+                            material.value("name", ""), place.back(), material[place].value("texCoord", size_t{0})));
         }
+    }
+
+    // Returns the coordinates that it wanted.
+    size_t normaliseBase(const Json& material, Json& texture) {
+        size_t wanted = texture.value("texCoord", size_t{0});
+        texture.erase("texCoord");
+        if (!texture.contains("extensions")) return wanted;
+        const Json::json_pointer transform("/extensions/KHR_texture_transform");
+        if (texture.contains(transform)) {
+            wanted = texture[transform].value("texCoord", wanted);
+            texture["extensions"].erase("KHR_texture_transform");
+            warnings_.push_back(
+                fmt::format("material '{}': its texture's transform is in TEXCOORD_0 now; textures "
+                            "other than the base colour's may lie elsewhere",
+                            material.value("name", "")));
+        }
+        if (texture["extensions"].empty()) texture.erase("extensions");
+        return wanted;
+    }
+
+    // Points it to where the base colour's coordinates are now, if it shares them.
+    static bool followsBase(Json& texture, size_t wanted) {
+        if (texture.value("texCoord", size_t{0}) != wanted) return false;
+        texture.erase("texCoord");
+        return true;
     }
 
     // Files that the level names relative to itself, seen from the new place.

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <span>
@@ -11,7 +12,7 @@
 namespace dimmer::cook {
 namespace {
 
-// 8192 x 8192: 1 GiB as linear floats, and what GPUs handle everywhere.
+// 8192 x 8192: 256 MiB, and what GPUs handle everywhere.
 constexpr uint64_t image_texels_max = uint64_t{1} << 26;
 
 // Of the encoded bytes: deflate packs at most 1032 bytes into one (RFC 1951), and a byte of PNG at most 8 texels.
@@ -23,13 +24,24 @@ float linearFromSrgb(float encoded) {
     return encoded <= 0.04045f ? encoded / 12.92f : std::pow((encoded + 0.055f) / 1.055f, 2.4f);
 }
 
-std::array<float, 256> decodeTable(TransferFunction transfer) {
-    std::array<float, 256> table{};
+using DecodeTable = std::array<float, 256>;
+
+DecodeTable makeTable(TransferFunction transfer) {
+    DecodeTable table{};
     for (size_t i = 0; i < table.size(); ++i) {
         const float encoded = static_cast<float>(i) / 255.0f;
         table[i] = transfer == TransferFunction::Srgb ? linearFromSrgb(encoded) : encoded;
     }
     return table;
+}
+
+const DecodeTable& decodeTable(TransferFunction transfer) {
+    static const std::array tables = {makeTable(TransferFunction::Srgb), makeTable(TransferFunction::Linear)};
+    return tables[transfer == TransferFunction::Srgb ? 0 : 1];
+}
+
+glm::vec4 decoded(const DecodeTable& table, glm::u8vec4 texel) {
+    return {table[texel.r], table[texel.g], table[texel.b], static_cast<float>(texel.a) / 255.0f};
 }
 
 // The encoded bytes; the buffer view's range was checked by checkModel.
@@ -68,7 +80,7 @@ uint32_t wrap(float coordinate, uint32_t size) {
 
 }  // namespace
 
-glm::vec4 Image::sample(glm::vec2 uv) const {
+glm::vec4 Texture::sample(glm::vec2 uv) const {
     if (texels.empty()) return glm::vec4(1);
     if (!std::isfinite(uv.x) || !std::isfinite(uv.y)) uv = glm::vec2(0);
     uv -= glm::floor(uv);  // first, so that large coordinates keep their fraction's precision
@@ -76,13 +88,23 @@ glm::vec4 Image::sample(glm::vec2 uv) const {
     const float x0 = std::floor(x), y0 = std::floor(y);
     const uint32_t left = wrap(x0, width), right = wrap(x0 + 1, width);
     const uint32_t top = wrap(y0, height), bottom = wrap(y0 + 1, height);
-    const auto texel = [&](uint32_t column, uint32_t row) { return texels[size_t{row} * width + column]; };
+    const DecodeTable& table = decodeTable(transfer);
+    const auto texel = [&](uint32_t column, uint32_t row) {
+        return decoded(table, texels[size_t{row} * width + column]);
+    };
     return glm::mix(glm::mix(texel(left, top), texel(right, top), x - x0),
                     glm::mix(texel(left, bottom), texel(right, bottom), x - x0), y - y0);
 }
 
-Expected<Image> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
-                            const std::string& owner) {
+glm::vec4 Texture::mean() const {
+    const DecodeTable& table = decodeTable(transfer);
+    glm::dvec4 sum(0);
+    for (const glm::u8vec4 texel : texels) sum += glm::dvec4(decoded(table, texel));
+    return glm::vec4(sum / static_cast<double>(std::max<size_t>(texels.size(), 1)));
+}
+
+Expected<Texture> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
+                              const std::string& owner) {
     const tinygltf::Image& source = context.model.images[static_cast<size_t>(index)];
     const std::string label = context.imageLabel(index) + (source.uri.empty() ? "" : " (" + source.uri + ")");
     const std::span<const unsigned char> bytes = encodedBytes(context.model, source);
@@ -105,20 +127,11 @@ Expected<Image> decodeImage(const ImportContext& context, int index, TransferFun
     if (!pixels || width < 1 || height < 1)
         return context.error(owner, label + " is damaged. Save it again and export the level again.");
 
-    Image image{static_cast<uint32_t>(width), static_cast<uint32_t>(height), {}};
-    image.texels.resize(size_t{image.width} * image.height);
-    const std::array<float, 256> decode = decodeTable(transfer);
-    for (size_t i = 0; i < image.texels.size(); ++i) {
-        const stbi_uc* rgba = pixels.get() + i * 4;
-        image.texels[i] = {decode[rgba[0]], decode[rgba[1]], decode[rgba[2]], static_cast<float>(rgba[3]) / 255.0f};
-    }
-    return image;
-}
-
-glm::vec4 meanTexel(const Image& image) {
-    glm::dvec4 sum(0);
-    for (const glm::vec4& texel : image.texels) sum += glm::dvec4(texel);
-    return glm::vec4(sum / static_cast<double>(std::max<size_t>(image.texels.size(), 1)));
+    Texture texture{static_cast<uint32_t>(width), static_cast<uint32_t>(height), transfer, {}};
+    texture.texels.resize(size_t{texture.width} * texture.height);
+    static_assert(sizeof(glm::u8vec4) == 4);
+    std::memcpy(texture.texels.data(), pixels.get(), 4 * texture.texels.size());
+    return texture;
 }
 
 }  // namespace dimmer::cook

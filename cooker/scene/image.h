@@ -5,14 +5,9 @@
 
 namespace dimmer::cook {
 
-enum class TransferFunction { Srgb, Linear };
-
 // Decodes PNG or JPEG, rows from the top. Alpha is always linear. `index` must be in range; `owner` is the material
 // that asks.
-Expected<Image> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
-                            const std::string& owner);
-
-// The mean over all texels.
-glm::vec4 meanTexel(const Image& image);
+Expected<Texture> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
+                              const std::string& owner);
 
 }  // namespace dimmer::cook

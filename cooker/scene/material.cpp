@@ -13,6 +13,7 @@ class MaterialImporter {
 
     Expected<std::vector<TextureMapping>> run() {
         const auto& materials = context_.model.materials;
+        findUsed();
         for (size_t i = 0; i < materials.size(); ++i)
             if (const auto ok = add(materials[i], static_cast<int>(i)); !ok) return std::unexpected(ok.error());
         return std::move(mappings_);
@@ -24,12 +25,23 @@ class MaterialImporter {
         Material material;
         material.name = source.name.empty() ? fmt::format("material_{}", index) : source.name;
         material.double_sided = source.doubleSided;
+        is_used_ = used_[static_cast<size_t>(index)];
         for (const auto step :
              {&MaterialImporter::surface, &MaterialImporter::baseTexture, &MaterialImporter::metalTexture,
               &MaterialImporter::specular, &MaterialImporter::emission, &MaterialImporter::alphaMode})
             if (const auto ok = (this->*step)(source, material); !ok) return ok;
         context_.scene.materials.push_back(std::move(material));
         return {};
+    }
+
+    // By nodes' meshes. Images of other materials may be missing, and take no memory.
+    void findUsed() {
+        used_.resize(context_.model.materials.size());
+        for (const tinygltf::Node& node : context_.model.nodes) {
+            if (node.mesh < 0) continue;
+            for (const tinygltf::Primitive& p : context_.model.meshes[static_cast<size_t>(node.mesh)].primitives)
+                if (p.material >= 0) used_[static_cast<size_t>(p.material)] = true;
+        }
     }
 
     // A factor that glTF limits to 0..1: beyond is clamped and said so, not a number is an error.
@@ -59,9 +71,10 @@ class MaterialImporter {
         return {};
     }
 
-    // The image behind a texture; empty when there is none (a texture may exist for an extension's image alone).
+    // The image behind a texture of a material that is used; empty when there is none (a texture may exist for an
+    // extension's image alone).
     std::optional<int> imageOf(const tinygltf::TextureInfo& info) const {
-        if (info.index < 0) return std::nullopt;
+        if (info.index < 0 || !is_used_) return std::nullopt;
         const int source = context_.model.textures[static_cast<size_t>(info.index)].source;
         return source < 0 ? std::nullopt : std::optional(source);
     }
@@ -69,19 +82,19 @@ class MaterialImporter {
     Expected<void> baseTexture(const tinygltf::Material& source, Material& material) {
         const tinygltf::TextureInfo& info = source.pbrMetallicRoughness.baseColorTexture;
         mappings_.emplace_back();
-        if (info.index < 0) return {};
+        if (info.index < 0 || !is_used_) return {};
         const auto image = imageOf(info);
         if (!image) {
             context_.warn(owner_, "its base colour texture has no PNG or JPEG image and was ignored.");
             return {};
         }
-        const auto [known, is_new] = image_of_source_.try_emplace(*image, context_.scene.images.size());
+        const auto [known, is_new] = image_of_source_.try_emplace(*image, context_.scene.textures.size());
         if (is_new) {
-            Expected<Image> decoded = decodeImage(context_, *image, TransferFunction::Srgb, owner_);
+            Expected<Texture> decoded = decodeImage(context_, *image, TransferFunction::Srgb, owner_);
             if (!decoded) return std::unexpected(decoded.error());
-            context_.scene.images.push_back(std::move(*decoded));
+            context_.scene.textures.push_back(std::make_shared<const Texture>(std::move(*decoded)));
         }
-        material.base_color_image = static_cast<uint32_t>(known->second);
+        material.base_color_texture = static_cast<uint32_t>(known->second);
         warnWrapping(info);
         return mapping(info);
     }
@@ -129,7 +142,7 @@ class MaterialImporter {
         const auto decoded = decodeImage(context_, image, transfer, owner_);
         if (!decoded) return std::unexpected(decoded.error());
         context_.warn(owner_, fmt::format("the bake uses the mean of its {} texture.", what));
-        return meanTexel(*decoded);
+        return decoded->mean();
     }
 
     Expected<void> metalTexture(const tinygltf::Material& source, Material& material) {
@@ -188,9 +201,11 @@ class MaterialImporter {
     }
 
     ImportContext& context_;
-    std::string owner_;  // the material at hand
+    std::string owner_;     // the material at hand
+    bool is_used_ = false;  // likewise
     std::vector<TextureMapping> mappings_;
-    std::map<int, size_t> image_of_source_;  // index into Scene::images per image of the file
+    std::vector<bool> used_;                 // per material
+    std::map<int, size_t> image_of_source_;  // index into Scene::textures per image of the file
 };
 
 }  // namespace

@@ -16,8 +16,8 @@ struct TextureMapping {
     }
 };
 
-// Fills Scene::materials, one per material of the file in its order, and Scene::images with the base colour images
-// in use. Returns the materials' texture mappings.
+// Fills Scene::materials, one per material of the file in its order, and Scene::textures with the base colours of those
+// that some mesh uses. Returns the materials' texture mappings.
 Expected<std::vector<TextureMapping>> importMaterials(ImportContext& context);
 
 // glTF's default material: white, fully metallic, single-sided.

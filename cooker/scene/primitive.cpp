@@ -58,6 +58,8 @@ class PrimitiveReader {
         const auto normals = attribute("NORMAL", Attribute::Normal);
         if (!normals) return std::unexpected(normals.error());
         geometry_.normals = asVec3(*normals);
+        if (primitive_.attributes.contains("COLOR_0"))
+            context_.warn(owner_, "has vertex colours (COLOR_0), which are not baked: its materials' colours are.");
         return {};
     }
 

@@ -17,11 +17,23 @@ namespace dimmer::cook {
 
 enum class AlphaMode { Opaque, Mask, Blend };
 
+enum class TransferFunction : uint8_t { Srgb, Linear };
+
+// A material's image, as files have it: levels hold hundreds, and a quarter of what floats would take.
+struct Texture {
+    uint32_t width = 0, height = 0;
+    TransferFunction transfer = TransferFunction::Srgb;  // of the colour; alpha is always linear
+    std::vector<glm::u8vec4> texels;                     // rows from the top
+    // Linear. Bilinear, repeating.
+    glm::vec4 sample(glm::vec2 uv) const;
+    // Linear, over all texels.
+    glm::vec4 mean() const;
+};
+
+// Of the sky.
 struct Image {
     uint32_t width = 0, height = 0;
-    std::vector<glm::vec4> texels;  // linear colour, alpha; rows from the top
-    // Bilinear, repeating.
-    glm::vec4 sample(glm::vec2 uv) const;
+    std::vector<glm::vec4> texels;  // linear; rows from the top
 };
 
 struct Material {
@@ -34,7 +46,7 @@ struct Material {
     AlphaMode alpha_mode = AlphaMode::Opaque;
     float alpha_cutoff = 0.5f;
     bool double_sided = false;
-    std::optional<uint32_t> base_color_image;  // index into Scene::images, multiplies base_color and alpha
+    std::optional<uint32_t> base_color_texture;  // index into Scene::textures, multiplies base_color and alpha
 
     // Total Lambert reflectance for a given base colour, clamped to [0, 0.99].
     glm::vec3 reflectance(glm::vec3 color) const;
@@ -157,8 +169,8 @@ struct ElementRef {
 struct Scene {
     std::string file;
     std::vector<Material> materials;
-    std::vector<Image> images;
-    std::vector<SceneMesh> meshes;  // dynamic ones included; they neither block nor reflect
+    std::vector<std::shared_ptr<const Texture>> textures;  // shared by all copies of a scene
+    std::vector<SceneMesh> meshes;                         // dynamic ones included; they neither block nor reflect
     std::vector<PunctualLight> lights;
     std::vector<SceneLightSet> light_sets;  // in order of first appearance
     std::vector<SceneDoor> doors;           // in order of first appearance

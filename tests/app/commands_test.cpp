@@ -95,8 +95,13 @@ TEST_F(Commands, CookRefusesBadInputAndWritesNothing) {
 TEST_F(Commands, OverBudgetIsExitCodeThree) {
     write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
     write("kept.dimmer", "the old pack");
-    const auto result = cook("kept.dimmer", {}, "level.gltf", "tight.json");
+    json level = json::parse(readText(file("level.gltf")));
+    level["nodes"][0]["extras"]["dimmer_texel_densty"] = 2;
+    write("typo.gltf", level.dump());
+    const auto result = cook("kept.dimmer", {}, "typo.gltf", "tight.json");
     EXPECT_EQ(result.exit_code, 3);
+    // What was to be said of the level may well be the reason.
+    EXPECT_THAT(result.err, AllOf(HasSubstr("warning: "), HasSubstr("dimmer_texel_densty")));
     EXPECT_THAT(result.out, IsEmpty());
     EXPECT_THAT(result.err,
                 AllOf(HasSubstr("over budget, nothing was written"), HasSubstr("total: "), HasSubstr("'both'")));

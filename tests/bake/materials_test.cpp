@@ -9,10 +9,10 @@ namespace {
 // The left half of one kind, the right half of another.
 uint32_t addHalfImage(Scene& scene, glm::vec4 left, glm::vec4 right) {
     // Wide enough that filtering blurs a hundredth of it.
-    Image image{64, 1, {}};
-    for (int x = 0; x < 64; ++x) image.texels.push_back(x < 32 ? left : right);
-    scene.images.push_back(std::move(image));
-    return static_cast<uint32_t>(scene.images.size() - 1);
+    Texture texture{64, 1, TransferFunction::Linear, {}};
+    for (int x = 0; x < 64; ++x) texture.texels.emplace_back(glm::round(255.0f * (x < 32 ? left : right)));
+    scene.textures.push_back(std::make_shared<const Texture>(std::move(texture)));
+    return static_cast<uint32_t>(scene.textures.size() - 1);
 }
 
 void addUv(SceneMesh& quad) {
@@ -30,7 +30,7 @@ TEST(BakeMaterials, MaskCutsOut) {
     addFloor(scene, 2, addMaterial(scene, lambert(0)));
     Material sheet = lambert(0);
     sheet.alpha_mode = AlphaMode::Mask;
-    sheet.base_color_image = addHalfImage(scene, {1, 1, 1, 0.2f}, {1, 1, 1, 0.8f});
+    sheet.base_color_texture = addHalfImage(scene, {1, 1, 1, 0.2f}, {1, 1, 1, 0.8f});
     addUv(addQuad(scene, "sheet", {0, 1, 0}, {3, 0, 0}, {0, 0, 3}, addMaterial(scene, sheet)));
     addPointLight(scene, {0, 2, 0}, 100, BakeMode::Full);
     BakedScene b(scene);
@@ -144,7 +144,7 @@ TEST(BakeMaterials, TexturesReflectByTheirColour) {
     Material floor = lambert(1);
     Scene scene = lampBetween(floor, true);
     scene.materials[0].base_color = glm::vec3(1);
-    scene.materials[0].base_color_image = addHalfImage(scene, {0.8f, 0, 0, 1}, {0.2f, 0, 0, 1});
+    scene.materials[0].base_color_texture = addHalfImage(scene, {0.8f, 0, 0, 1}, {0.2f, 0, 0, 1});
     // addFloor's u runs along +Z.
     addUv(scene.meshes[0]);
     BakedScene b(scene, 8);

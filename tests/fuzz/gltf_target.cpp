@@ -38,10 +38,10 @@ void checkScene(const Scene& scene) {
     }
     for (const cook::Material& m : scene.materials) {
         require(finite({m.base_color, m.emission_cd_m2}), "materials are finite");
-        require(!m.base_color_image || *m.base_color_image < scene.images.size(), "a material's image is there");
+        require(!m.base_color_texture || *m.base_color_texture < scene.textures.size(), "a material's image is there");
     }
-    for (const cook::Image& image : scene.images)
-        require(image.texels.size() == size_t{image.width} * image.height, "an image holds its texels");
+    for (const auto& texture : scene.textures)
+        require(texture->texels.size() == size_t{texture->width} * texture->height, "a texture holds its texels");
     for (const auto& combination : scene.combinations)
         for (const cook::ElementRef& e : combination)
             require(e.index < (e.is_door ? scene.doors.size() : scene.light_sets.size()),
@@ -98,7 +98,7 @@ std::vector<Bytes> gltfSeeds() {
     const cook::test::LevelFile full = cook::test::fullLevel(), floor = cook::test::LevelFile::withFloor();
     const cook::test::LevelFile rare = rareLevel();
     const auto imported = rare.import();
-    require(imported.has_value() && imported->images.size() == 1, "the rare seed is a level");
+    require(imported.has_value() && imported->textures.size() == 1, "the rare seed is a level");
     cook::test::LevelFile boasting = rare;  // its picture's header claims 8192 x 8192 texels
     std::string picture = boasting.document["images"][0]["uri"];
     constexpr std::string_view size = "AAAAEAAAABCAYA";

@@ -39,7 +39,7 @@ constexpr size_t megabyte = 1 << 20;
 constexpr std::array list = {
     // 16 MiB: what runPack lets chunks unfold to, four times over.
     Target{"pack", runPack, packSeeds, 17 * megabyte, 1000},
-    // Decoded images are floats, 16 bytes a texel, and a kilobyte of PNG holds a million texels.
+    // Decoded textures take 4 bytes a texel, and a kilobyte of PNG holds a million texels.
     Target{"gltf", runGltf, gltfSeeds, 64 * megabyte, 4000},
     Target{"profile", runProfile, profileSeeds, megabyte, 1000},
     Target{"state", runState, stateSeeds, megabyte, 1000},

@@ -27,6 +27,34 @@ Transform transformOf(const glm::dmat4& m) {
     return t;
 }
 
+// Integer positions have tiny scales, files in millimetres small ones: sizes that differ by a percent are two shapes,
+// those that rounding parts are one, also across a power of two.
+TEST(ModelShape, SizesAreToldApartAtAnyScale) {
+    for (const double scale : {1.0, 1e-3, 1.22e-4, 1e-6, 512.0}) {
+        Scene scene;
+        const uint32_t grey = addMaterial(scene, lambert(0.5f));
+        double x = 0;
+        for (const double size : {1.0, 1.01, 1 - 1e-7, 1.2}) {
+            x += 5;
+            const glm::dmat4 at = glm::scale(placed({x, 0, 0}, x), glm::dvec3(scale * size));
+            SceneMesh& mesh = addCrate(scene, "crate", at, glm::vec3(static_cast<float>(0.5 / scale)), grey);
+            mesh.gltf_mesh = 7;
+            mesh.gltf_node = static_cast<int>(scene.meshes.size());
+        }
+        listModels(scene, {});
+        ASSERT_EQ(scene.models.size(), 4u);
+        std::vector<ModelShape> shapes;
+        for (const SceneModel& model : scene.models) {
+            const auto shape = shapeOf(scene, model);
+            ASSERT_TRUE(shape) << scale;
+            shapes.push_back(*shape);
+        }
+        EXPECT_NE(shapes[0], shapes[1]) << scale;
+        EXPECT_EQ(shapes[0], shapes[2]) << scale;
+        EXPECT_NE(shapes[0], shapes[3]) << scale;
+    }
+}
+
 TEST(ModelMesh, QuantisedVerticesAreAsExactAsStated) {
     ModelMesh box;
     box.min_m = {-1, 2, 0};

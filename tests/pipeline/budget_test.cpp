@@ -35,23 +35,40 @@ TEST(Budget, CostsAreSums) {
 }
 
 TEST(Budget, AnElementHoldsEveryContributionThatNamesIt) {
-    const PackData data = samplePack();
+    PackData data = samplePack();
+    // Four probes that the first two contributions light, and two that the last one does.
+    const auto last = static_cast<uint32_t>(data.contributions.size() - 1);
+    ASSERT_GE(last, 2u);
+    data.probes.clusters = {{0, 4, 0, 1, 0, 2}, {4, 2, 1, 1, 2, 1}};
+    data.probes.terms = {{0, 0}, {1, 4}, {last, 8}};
+    data.probes.record_counts.assign(data.contributions.size(), 0);
+    data.probes.record_counts[0] = data.probes.record_counts[1] = 4;
+    data.probes.record_counts[last] = 2;
     const PackCost cost = costOf(data);
     ASSERT_EQ(cost.elements.size(), data.elements.size());
+    uint64_t all_probes = 0;
     for (uint32_t e = 0; e < data.elements.size(); ++e) {
-        uint64_t receivers = 0;
-        for (const Cluster& cluster : data.clusters)
-            for (uint32_t t = 0; t < cluster.term_count; ++t) {
-                const Contribution& c = data.contributions[data.terms[cluster.first_term + t].contribution];
-                std::vector<uint32_t> names = c.doors_open;
-                names.insert(names.end(), c.doors_closed.begin(), c.doors_closed.end());
-                if (c.light_set) names.push_back(*c.light_set);
-                if (std::ranges::find(names, e) != names.end()) receivers += cluster.receiver_count;
-            }
+        const auto count = [&](std::span<const Cluster> clusters, std::span<const ClusterTerm> terms) {
+            uint64_t receivers = 0;
+            for (const Cluster& cluster : clusters)
+                for (uint32_t t = 0; t < cluster.term_count; ++t) {
+                    const Contribution& c = data.contributions[terms[cluster.first_term + t].contribution];
+                    std::vector<uint32_t> names = c.doors_open;
+                    names.insert(names.end(), c.doors_closed.begin(), c.doors_closed.end());
+                    if (c.light_set) names.push_back(*c.light_set);
+                    if (std::ranges::find(names, e) != names.end()) receivers += cluster.receiver_count;
+                }
+            return receivers;
+        };
+        const uint64_t texels = count(data.clusters, data.terms),
+                       probes = count(data.probes.clusters, data.probes.terms);
+        all_probes += probes;
         EXPECT_EQ(cost.elements[e].element, e);
-        EXPECT_EQ(cost.elements[e].receivers, receivers);
-        EXPECT_EQ(cost.elements[e].bytes, 8 * receivers);
+        EXPECT_EQ(cost.elements[e].receivers, texels);
+        EXPECT_EQ(cost.elements[e].bytes, 8 * texels + 28 * probes);
+        EXPECT_EQ(cost.elements[e].probe_bytes, 28 * probes);
     }
+    EXPECT_GT(all_probes, 0u);
 }
 
 TEST(Budget, OverlapHistogramCountsEveryTexel) {

@@ -146,6 +146,26 @@ TEST(Settings, MistakesOfLevelAndCommandLine) {
     EXPECT_FALSE(std::filesystem::exists(folder.path / "level.dimmer"));
 }
 
+// One profile serves many levels: what it says of a set that this one has not is a warning that names the profile.
+TEST(Settings, AProfileMayNameSetsOfOtherLevels) {
+    const TemporaryFolder folder;
+    const auto profile = writeText(folder, "mine.json", R"({"records": {"thresholds": {"won": 0.4, "one": 0.5}},
+        "bake": {"draft": {"samples_per_texel": 1, "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
+    SilentProgress silent;
+    const auto result = cook({.level = writeLevel(folder, twoCells()),
+                              .pack = folder.path / "level.dimmer",
+                              .profile = profile.string(),
+                              .quality = "draft"},
+                             silent);
+    ASSERT_TRUE(result.has_value()) << result.error().message;
+    EXPECT_THAT(result->stats.warnings,
+                testing::Contains(AllOf(HasSubstr("mine.json"), HasSubstr("'records.thresholds.won'"),
+                                        HasSubstr("did you mean 'one'?"))));
+    const json settings = json::parse(result->pack.settings_json);
+    EXPECT_FALSE(settings.contains("records.thresholds.won"));
+    EXPECT_EQ(settings["records.thresholds.one"]["from"], "mine.json");
+}
+
 // A set's own threshold changes that set alone.
 TEST(Settings, AThresholdForOneSet) {
     Profile profile = smallProfile();

@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <set>
 
 namespace dimmer::cook::test {
 namespace {
@@ -115,6 +116,57 @@ struct Glb {
         return out;
     }
 };
+
+// Two sets that share an emissive material have a copy each while they are baked: the level is the same level.
+TEST(WriteLevel, SetsMayShareAnEmissiveMaterial) {
+    LevelFile level = LevelFile::withFloor();
+    const int bulb = level.addMaterial({{"name", "bulb"}, {"emissiveFactor", {1, 1, 1}}}), shade = addWhite(level);
+    for (const char* set : {"hall", "kitchen"}) {
+        const int lamp = level.addSquareMesh(bulb);
+        json second = level.primitive(lamp);
+        second["material"] = shade;
+        level.document["meshes"][static_cast<size_t>(lamp)]["primitives"].push_back(second);
+        const float up = set[0] == 'h' ? 1.0f : 2.0f;
+        level.addNode({{"name", set},
+                       {"mesh", lamp},
+                       {"translation", {0, up, 0}},
+                       {"extras", {{"dimmer_light_set", set}, {"dimmer_lighting", "lightmap"}}}});
+    }
+    const Written written(level);
+    const Glb glb(written.path);
+    std::set<std::string> materials;
+    for (const json& mesh : glb.document["meshes"])
+        for (const json& primitive : mesh["primitives"])
+            if (primitive.contains("material"))
+                materials.insert(glb.document["materials"].at(primitive["material"].get<size_t>()).value("name", ""));
+    EXPECT_TRUE(materials.contains("bulb"));
+}
+
+// What the written level has not is said, and textures follow the coordinates that they share with the base colour.
+TEST(WriteLevel, SaysWhatIsLost) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.document["nodes"][0]["mesh"];
+    json& attributes = level.primitive(mesh)["attributes"];
+    attributes["COLOR_0"] = attributes["POSITION"];
+    attributes["TEXCOORD_2"] = level.addVec2({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+    level.document["images"] = {{{"uri",
+                                  "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8"
+                                  "/5+hHgAHggJ/PchI7wAAAABJRU5ErkJggg=="}}};
+    level.document["textures"] = {{{"source", 0}}};
+    json& material = level.document["materials"][0];
+    material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}, {"texCoord", 2}};
+    material["normalTexture"] = {{"index", 0}, {"texCoord", 2}};
+    material["occlusionTexture"] = {{"index", 0}, {"texCoord", 1}};
+    const Written written(level);
+    EXPECT_THAT(written.warnings, testing::Contains(testing::AllOf(testing::HasSubstr("floor"),
+                                                                   testing::HasSubstr("COLOR_0 is not written"))));
+    EXPECT_THAT(written.warnings, testing::Contains(testing::HasSubstr("occlusionTexture wants TEXCOORD_1")));
+    const Glb glb(written.path);
+    const json& out = glb.document["materials"][0];
+    EXPECT_FALSE(out["normalTexture"].contains("texCoord"));
+    EXPECT_FALSE(out["pbrMetallicRoughness"]["baseColorTexture"].contains("texCoord"));
+    EXPECT_THAT(written.cooked.stats.warnings, testing::Contains(testing::HasSubstr("vertex colours")));
+}
 
 TEST(WriteLevel, IsValidGltf) {
     const Written written(richLevel());
@@ -340,7 +392,7 @@ TEST(WriteLevel, ImagesAndTransformsOfTexturesGoAlong) {
     EXPECT_THAT(written.warnings, testing::ElementsAre(HasSubstr("material 'white'")));
     const auto before = level.import(), after = importLevel(written.path);
     ASSERT_TRUE(after) << after.error().message;
-    ASSERT_EQ(after->images.size(), 1u);
+    ASSERT_EQ(after->textures.size(), 1u);
     const auto texel_at = [](const Scene& scene, float x, float z) {
         for (size_t v = 0; v < scene.meshes[0].positions_m.size(); ++v)
             if (glm::distance(scene.meshes[0].positions_m[v], {x, 0, z}) < 1e-6f) return scene.meshes[0].uv0[v];

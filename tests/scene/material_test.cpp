@@ -116,28 +116,32 @@ TEST(SceneMaterials, FactorsOutsideTheirRange) {
 TEST(SceneMaterials, TexturesBecomeLinear) {
     const auto scene = levelWithPoster(json::object(), red_and_grey).import();
     ASSERT_IMPORTED(scene);
-    ASSERT_EQ(scene->images.size(), 1u);
-    EXPECT_EQ(scene->materials[1].base_color_image, 0u);
-    const Image& image = scene->images[0];
+    ASSERT_EQ(scene->textures.size(), 1u);
+    EXPECT_EQ(scene->materials[1].base_color_texture, 0u);
+    const Texture& image = *scene->textures[0];
     EXPECT_EQ(image.width, 2u);
     EXPECT_EQ(image.height, 1u);
-    expectNear(glm::vec3(image.texels[0]), {1, 0, 0});
+    const glm::vec4 red = image.sample({0.25f, 0.5f}), grey = image.sample({0.75f, 0.5f});  // the texels' centres
+    expectNear(glm::vec3(red), {1, 0, 0});
     // IEC 61966-2-1: 188/255 = 0.737255 -> ((0.737255 + 0.055) / 1.055)^2.4 = 0.502886; alpha is linear.
-    expectNear(glm::vec3(image.texels[1]), glm::vec3(0.502886f), 1e-5f);
-    EXPECT_FLOAT_EQ(image.texels[1].a, 0.2f);
+    expectNear(glm::vec3(grey), glm::vec3(0.502886f), 1e-5f);
+    EXPECT_FLOAT_EQ(grey.a, 0.2f);
+    expectNear(glm::vec3(image.mean()), {0.751443f, 0.251443f, 0.251443f}, 1e-5f);
     EXPECT_EQ(scene->meshes[1].uv0[1], glm::vec2(1, 1));
 }
 
 TEST(SceneMaterials, SamplingIsBilinearAndRepeats) {
-    const Image image{2, 2, {glm::vec4(0), glm::vec4(1), glm::vec4(2), glm::vec4(3)}};
-    EXPECT_FLOAT_EQ(image.sample({0.25f, 0.25f}).x, 0);  // texel centres
-    EXPECT_FLOAT_EQ(image.sample({0.75f, 0.25f}).x, 1);
-    EXPECT_FLOAT_EQ(image.sample({0.25f, 0.75f}).x, 2);
-    EXPECT_FLOAT_EQ(image.sample({0.5f, 0.5f}).x, 1.5f);
-    EXPECT_FLOAT_EQ(image.sample({0.375f, 0.25f}).x, 0.25f);
-    EXPECT_FLOAT_EQ(image.sample({0, 0.25f}).x, 0.5f);  // between the last column and the first
-    EXPECT_FLOAT_EQ(image.sample({-0.25f, 0.25f}).x, 1);
-    EXPECT_FLOAT_EQ(image.sample({7.75f, -3.25f}).x, 3);
+    using Code = glm::u8vec4;
+    const Texture image{2, 2, TransferFunction::Linear, {Code(0), Code(85), Code(170), Code(255)}};  // thirds
+    const auto at = [&](glm::vec2 uv) { return 3 * image.sample(uv).x; };
+    EXPECT_NEAR(at({0.25f, 0.25f}), 0, 1e-5f);  // texel centres
+    EXPECT_NEAR(at({0.75f, 0.25f}), 1, 1e-5f);
+    EXPECT_NEAR(at({0.25f, 0.75f}), 2, 1e-5f);
+    EXPECT_NEAR(at({0.5f, 0.5f}), 1.5f, 1e-5f);
+    EXPECT_NEAR(at({0.375f, 0.25f}), 0.25f, 1e-5f);
+    EXPECT_NEAR(at({0, 0.25f}), 0.5f, 1e-5f);  // between the last column and the first
+    EXPECT_NEAR(at({-0.25f, 0.25f}), 1, 1e-5f);
+    EXPECT_NEAR(at({7.75f, -3.25f}), 3, 1e-5f);
     EXPECT_TRUE(std::isfinite(image.sample({INFINITY, NAN}).x));
     EXPECT_TRUE(std::isfinite(image.sample({1e30f, -1e-30f}).x));
 }
@@ -163,9 +167,11 @@ TEST(SceneMaterials, TextureTransformAndSet) {
 TEST(SceneMaterials, EmissiveAndMetalTexturesCountWithTheirMean) {
     LevelFile level = LevelFile::withFloor();
     const int texture = addTexture(level, {255, 0, 0, 255, 0, 0, 255, 255});
-    level.addMaterial({{"name", "screen"}, {"emissiveFactor", {4, 4, 4}}, {"emissiveTexture", {{"index", texture}}}});
-    level.addMaterial(
+    const int screen = level.addMaterial(
+        {{"name", "screen"}, {"emissiveFactor", {4, 4, 4}}, {"emissiveTexture", {{"index", texture}}}});
+    const int half_metal = level.addMaterial(
         {{"name", "half"}, {"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", texture}}}}}});
+    for (const int material : {screen, half_metal}) level.addNode({{"mesh", level.addSquareMesh(material)}});
     const auto scene = level.import();
     ASSERT_IMPORTED(scene);
     expectNear(scene->materials[1].emission_cd_m2, {2, 0, 2});
@@ -181,6 +187,10 @@ TEST(SceneMaterials, UnusableImagesAreRefused) {
     const auto view = image["bufferView"].get<size_t>();
     image = {{"name", "picture"}, {"uri", "nowhere.png"}};
     expectBadInput(level.import(), {"material 'picture'", "nowhere.png"});
+    level.document["nodes"].back().erase("mesh");  // nobody's image
+    ASSERT_IMPORTED(level.import());
+    EXPECT_TRUE(level.import()->textures.empty());
+    level.document["nodes"].back()["mesh"] = level.document["meshes"].size() - 1;
     image = {{"name", "picture"}, {"uri", "data:image/png;base64,AAAAAAAAAAAAAAAA"}};
     expectBadInput(level.import(), {"material 'picture'", "neither PNG nor JPEG"});
     image = good;
