@@ -51,13 +51,7 @@ Expected<void> checkSupport(const VulkanContext& vulkan, VkFormat format, const 
         return fail(ErrorCode::Unsupported,
                     fmt::format("The Vulkan device cannot write {} images through R32_UINT views.", format_name));
     if (result != VK_SUCCESS) return vulkanError(result, "vkGetPhysicalDeviceImageFormatProperties");
-    if (width > limits.maxExtent.width || height > limits.maxExtent.height || layers > limits.maxArrayLayers)
-        return fail(
-            ErrorCode::Unsupported,
-            fmt::format("The pack's {} pages of {} x {} texels exceed the Vulkan device's {} layers of {} x {}. "
-                        "Cook with smaller pages.",
-                        layers, width, height, limits.maxArrayLayers, limits.maxExtent.width, limits.maxExtent.height));
-    return {};
+    return checkPageLimits(limits, width, height, layers);
 }
 
 Expected<ImageViewHandle> createView(VkDevice device, VkImage image, VkFormat format, VkImageUsageFlags usage) {
@@ -83,6 +77,22 @@ VkPipelineStageFlags samplingStages(const VulkanContext& vulkan) {
 }
 
 }  // namespace
+
+Expected<void> checkPageLimits(const VkImageFormatProperties& limits, uint32_t width, uint32_t height,
+                               uint32_t layers) {
+    if (width > limits.maxExtent.width || height > limits.maxExtent.height || layers > limits.maxArrayLayers)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("The pack's {} pages of {} x {} texels exceed the Vulkan device's {} layers of {} x {}. "
+                        "Cook with smaller pages.",
+                        layers, width, height, limits.maxArrayLayers, limits.maxExtent.width, limits.maxExtent.height));
+    const uint64_t bytes = sizeof(uint32_t) * width * height * layers;
+    if (bytes <= limits.maxResourceSize) return {};
+    return fail(ErrorCode::Unsupported,
+                fmt::format("The pack's {} pages of {} x {} texels are images of {} bytes; the Vulkan device's are at "
+                            "most {} bytes. Cook with fewer texels per metre.",
+                            layers, width, height, bytes, limits.maxResourceSize));
+}
 
 Expected<LightmapPages> LightmapPages::create(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
     LightmapPages pages;

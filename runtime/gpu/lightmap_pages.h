@@ -6,6 +6,9 @@
 
 namespace dimmer {
 
+// Whether the device has images of so many texels of 4 bytes: Unsupported, with the mend, where it does not.
+Expected<void> checkPageLimits(const VkImageFormatProperties& limits, uint32_t width, uint32_t height, uint32_t layers);
+
 class LightmapPages {
    public:
     // Creates the images and fills them with the base; blocking. They end in SHADER_READ_ONLY_OPTIMAL.

@@ -30,13 +30,6 @@ Expected<void> checkContext(const VulkanContext& vulkan) {
                 "and queue are all needed.");
 }
 
-// Of an update that found nothing to do.
-UpdateStats idleStats(double host_us) {
-    UpdateStats stats;
-    stats.host_us = host_us;
-    return stats;
-}
-
 Expected<SemaphoreHandle> createTimeline(VkDevice device) {
     auto type = vkStruct<VkSemaphoreTypeCreateInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO);
     type.semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE;
@@ -294,16 +287,16 @@ void Runtime::planProbes(UpdateStats& stats) {
     if (!impl.probes_planned && !impl.models_planned) impl.probe_front = impl.probe_target;
 }
 
-// What the next update will do. Nothing: there is nothing to execute, and the last update's figures stand.
-std::optional<UpdateStats> Runtime::planNext() {
+// What the next update will do. False: there is nothing to execute, and the last update's figures stand; `stats` may
+// still say what was put off.
+bool Runtime::planNext(UpdateStats& stats) {
     Impl& impl = *impl_;
     impl.texels_planned = impl.probes_planned = impl.models_planned = impl.recorded = false;
-    UpdateStats stats;
     planTexels(stats);
     planProbes(stats);
-    if (!impl.texels_planned && !impl.probes_planned && !impl.models_planned) return std::nullopt;
+    if (!impl.texels_planned && !impl.probes_planned && !impl.models_planned) return false;
     impl.timed = false;
-    return stats;
+    return true;
 }
 
 // What was planned cannot be carried out.
@@ -326,9 +319,11 @@ void Runtime::finish() {
 
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
     const auto start = std::chrono::steady_clock::now();
-    const auto planned = planNext();
-    if (!planned) return idleStats(microsecondsSince(start));
-    impl_->stats = *planned;
+    UpdateStats planned;
+    const bool works = planNext(planned);
+    planned.host_us = microsecondsSince(start);
+    if (!works) return planned;
+    impl_->stats = planned;
     // An update that submit() sent may still be reading the work list.
     if (auto done = impl_->waitForSubmitted(); !done) {
         rollback();
@@ -352,10 +347,11 @@ void Runtime::discardRecorded() {
 
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     auto start = std::chrono::steady_clock::now();
-    const auto planned = planNext();
-    const double planning_us = microsecondsSince(start);
-    if (!planned) return idleStats(planning_us);
-    impl_->stats = *planned;
+    UpdateStats planned;
+    const bool works = planNext(planned);
+    planned.host_us = microsecondsSince(start);
+    if (!works) return planned;
+    impl_->stats = planned;
 
     auto sent = impl_->waitForSubmitted();
     start = std::chrono::steady_clock::now();
@@ -365,7 +361,7 @@ Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
         return std::unexpected(std::move(sent.error()));
     }
     finish();
-    impl_->stats.host_us = planning_us + microsecondsSince(start);
+    impl_->stats.host_us = planned.host_us + microsecondsSince(start);
     return impl_->stats;
 }
 

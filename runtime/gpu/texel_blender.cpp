@@ -20,26 +20,6 @@ constexpr uint32_t lanes_per_texel_item = 8, texel_items_per_workgroup = workgro
 // Of a TexelItem.
 constexpr uint32_t item_index_bits = 26, item_count_bits = 12;
 
-Expected<void> checkLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places, const Planner& planner) {
-    const uint64_t payload_bytes = places.records * sizeof(TexelRecord);
-    const uint64_t base_bytes = places.receivers.size() * sizeof(TexelRecord);
-    const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
-    const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
-    constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
-    if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end)
-        return fail(
-            ErrorCode::Unsupported,
-            fmt::format("The pack has {} batches and {} terms, up to {} at a receiver; this runtime takes fewer "
-                        "than {}, {} and {}. Cook with fewer texels per metre or a higher activity threshold.",
-                        planner.itemsMax(), planner.termsMax(), planner.overlapMax(), index_end, index_end, count_end));
-    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
-    return fail(ErrorCode::Unsupported,
-                fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
-                            "exceeds what this Vulkan device reads as one texel buffer, {} bytes. Cook with fewer "
-                            "texels per metre or a higher activity threshold.",
-                            payload_bytes, base_bytes, work_bytes, bytes_max));
-}
-
 std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) {
     std::vector<Run> runs;
     for (const Cluster& cluster : data.clusters)
@@ -55,12 +35,36 @@ Specialisation specialisationOf(uint32_t group, ColorFormat format) {
 
 }  // namespace
 
+Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places,
+                                const Planner& planner, uint64_t records_bytes_max) {
+    // Of the records, the store has no more than this on the device at a time.
+    const uint64_t all_bytes = places.records * sizeof(TexelRecord);
+    const uint64_t payload_bytes = records_bytes_max == 0 ? all_bytes : std::min(all_bytes, records_bytes_max);
+    const uint64_t base_bytes = places.receivers.size() * sizeof(TexelRecord);
+    const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
+    const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
+    constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
+    if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("The pack has {} batches and {} terms, up to {} at a receiver; this runtime takes fewer "
+                        "than {}, {} and {}. Cook with fewer texels per metre or a higher activity threshold.",
+                        planner.itemsMax(), planner.termsMax(), planner.overlapMax(), index_end, index_end, count_end));
+    if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
+    return fail(ErrorCode::Unsupported,
+                fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
+                            "exceeds what this Vulkan device reads as one texel buffer, {} bytes. Cook with fewer "
+                            "texels per metre or a higher activity threshold, or, where it is the records alone, "
+                            "load fewer at a time: load_records = false and a smaller records_bytes_max.",
+                            payload_bytes, base_bytes, work_bytes, bytes_max));
+}
+
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             std::span<const LightmapPages> page_sets, Transfer& transfer,
                                             const RuntimeOptions& options) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    DIMMER_TRY(checkLimits(properties.limits, placesOf(data), planner));
+    DIMMER_TRY(checkTexelLimits(properties.limits, placesOf(data), planner, options.records_bytes_max));
     TexelBlender blender;
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
     blender.per_combination_ = options.mode == UpdateMode::PerCombination;

@@ -3,10 +3,16 @@
 
 #include <gpu/record_store.h>
 #include <gpu/texel_executor.h>
+#include <update/device_places.h>
 
 #include <array>
 
 namespace dimmer {
+
+// Whether the device reads what a TexelBlender keeps there, with RuntimeOptions::records_bytes_max: Unsupported, with
+// the mend, where it does not.
+Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places,
+                                const Planner& planner, uint64_t records_bytes_max);
 
 class TexelBlender : public TexelExecutor {
    public:

@@ -51,12 +51,22 @@ void Planner::setElement(uint32_t index, Weight weight) {
 
 void Planner::setLimits(const UpdateLimits& limits) {
     if (limits == limits_) return;
+    // What may throw comes first: then nothing has changed.
+    if (quanta_per_weight_.empty() && limits != UpdateLimits{}) prepareLimits();
     recheck_ = recheck_ || limits.tolerance_quanta < limits_.tolerance_quanta;
-    starts_over_ = true;
+    // With another budget, what waits goes on: where it follows each frame's headroom, no state would ever be complete.
+    starts_over_ = starts_over_ || limits.tolerance_quanta != limits_.tolerance_quanta || limits.receivers_max == 0;
     limits_ = limits;
-    if (!quanta_per_weight_.empty() || (limits.receivers_max == 0 && limits.tolerance_quanta == 0)) return;
-    quanta_per_weight_ = quantaPerWeight(data_);
-    for (const ClusterTerm& term : receivers_.terms) written_.push_back(planned_[term.contribution]);
+}
+
+void Planner::prepareLimits() {
+    std::vector<float> quanta = quantaPerWeight(data_);
+    std::vector<Weight> written;
+    written.reserve(receivers_.terms.size());
+    for (const ClusterTerm& term : receivers_.terms) written.push_back(planned_[term.contribution]);
+    urgent_.reserve(receivers_.clusters.size());
+    quanta_per_weight_ = std::move(quanta);
+    written_ = std::move(written);
 }
 
 void Planner::markDirty(uint32_t contribution) {
@@ -191,19 +201,25 @@ constexpr float plain_quanta = 1023;
 
 // The most visible first; what has waited counts for more with every plan. By the square: something faint waits behind
 // what changes in every frame for as many plans as the root of how much more that shows, 32 at most.
+float Planner::urgency(const Waiting& waiting) {
+    const auto waited = static_cast<float>(waiting.plans + 1);
+    return (std::min(waiting.quanta, plain_quanta) + 1) * waited * waited;
+}
+
+// By a heap: a budget takes few of many, and a sort would put all in order.
 void Planner::takeWithin(uint32_t receivers) {
-    const auto urgency = [&](uint32_t cluster) {
-        const Waiting& waiting = waiting_[cluster];
-        const auto waited = static_cast<float>(waiting.plans + 1);
-        return (std::min(waiting.quanta, plain_quanta) + 1) * waited * waited;
+    urgent_.clear();
+    for (const uint32_t cluster : waiting_clusters_) urgent_.push_back({urgency(waiting_[cluster]), cluster});
+    const auto behind = [](const Urgent& a, const Urgent& b) {
+        return a.urgency != b.urgency ? a.urgency < b.urgency : a.cluster > b.cluster;
     };
-    std::ranges::sort(waiting_clusters_, [&](uint32_t a, uint32_t b) {
-        const float first = urgency(a), second = urgency(b);
-        return first != second ? first > second : a < b;
-    });
+    std::ranges::make_heap(urgent_, behind);
     int64_t left = receivers;
-    for (uint32_t cluster : waiting_clusters_) {
+    while (!urgent_.empty()) {
         if (left < batch_receivers_max && !parts_.empty()) break;
+        std::ranges::pop_heap(urgent_, behind);
+        const uint32_t cluster = urgent_.back().cluster;
+        urgent_.pop_back();
         const uint32_t before = waiting_[cluster].count;
         take(cluster, static_cast<uint32_t>(std::max<int64_t>(left, 0)));
         left -= int64_t{before - waiting_[cluster].count} * batch_receivers_max;
@@ -293,6 +309,8 @@ void Planner::rollback() {
     // With limits or leftovers, what the pages hold is known by cluster only: those planned are written once more.
     if (carried_over_ || !written_.empty())
         for (const Part& part : parts_) waitWhole(part.cluster);
+    // What waits now must not be written with the weights of before, which are brought back here.
+    starts_over_ = true;
     for (const Change& change : changes_) {
         planned_[change.contribution] = change.before;
         markDirty(change.contribution);

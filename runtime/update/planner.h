@@ -52,7 +52,8 @@ class Planner {
     const Weight& element(uint32_t index) const { return elements_[index]; }
     // Constant time; takes effect with the next plan().
     void setElement(uint32_t index, Weight weight);
-    // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records.
+    // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records. Where there
+    // is no memory for what they need it throws, and nothing has changed.
     void setLimits(const UpdateLimits& limits);
     // What waits must not be written with the weights that the last plan() saw.
     void startOver() { starts_over_ = true; }
@@ -61,10 +62,12 @@ class Planner {
     // nothing to do, else in proportion to the clusters that hold a changed contribution. False: nothing to do, work()
     // is empty.
     bool plan();
-    // The same for what waits alone; changes are left to the next plan(). Not after startOver() or other limits.
+    // The same for what waits alone; changes are left to the next plan(). Only where mayGoOn().
     bool planWaiting();
+    // Something waits, and may be written with the weights that the last plan() saw: not after startOver(), a
+    // rollback(), another tolerance, or the end of the limit on receivers.
     bool mayGoOn() const { return waiting() && !starts_over_; }
-    // The last plan was not executed: what it would have written is written by the next one.
+    // The last plan was not executed: what it would have written is written by the next plan().
     void rollback();
 
     // Whether batches wait, as the last plan was limited.
@@ -96,12 +99,18 @@ class Planner {
         uint32_t plans = 0;  // since anything of it was written
         float quanta = 0;    // by which the light there has changed, at most
     };
+    // A cluster that waits, in the heap of those that a limit chooses from.
+    struct Urgent {
+        float urgency;
+        uint32_t cluster;
+    };
     // A part of a cluster to write now, and its terms that are on.
     struct Part {
         uint32_t cluster, first_batch, batch_count;
         uint32_t first_term = 0, term_count = 0;
     };
 
+    void prepareLimits();
     Weight product(const Contribution& contribution) const;
     void markDirty(uint32_t contribution);
     void collectChanges();
@@ -115,6 +124,7 @@ class Planner {
     void touchAllPutOff();
     bool finishPlan();
     void takeAll();
+    static float urgency(const Waiting& waiting);
     void takeWithin(uint32_t receivers);
     void take(uint32_t cluster, uint32_t receivers);
     void planPart(Part& part);
@@ -138,6 +148,7 @@ class Planner {
     bool carried_over_ = false;               // some clusters waited already when the last plan began
     std::vector<Waiting> waiting_;            // per cluster
     std::vector<uint32_t> waiting_clusters_;  // those with a count
+    std::vector<Urgent> urgent_;              // only within takeWithin(); no room until there are limits
     std::vector<uint64_t> cluster_marks_;     // one bit per cluster, all 0 between calls
     size_t first_mark_ = 0, end_mark_ = 0;    // the words with marks
     std::vector<Part> parts_;                 // of the last plan, ascending by cluster

@@ -20,13 +20,34 @@ class AsyncTest : public test::GpuTest {
         if (!runtime) throw std::runtime_error(runtime.error().message);
         return std::move(*runtime);
     }
+    static void showWholeStates(uint32_t budget_step);
     static void expectEqualPages(Runtime& gpu, const CpuRuntime& cpu) {
         const auto pages = gpu.readPages();
         ASSERT_TRUE(pages) << pages.error().message;
         ASSERT_TRUE(std::ranges::equal(pages->irradiance, cpu.irradiancePages()));
         ASSERT_TRUE(std::ranges::equal(pages->direction, cpu.directionPages()));
     }
+    // An update in commands that never run.
+    static void recordInVain(Runtime& gpu) {
+        auto commands = createCommandBuffer(device().context().device, device().context().queue_family);
+        ASSERT_TRUE(commands);
+        VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
+        ASSERT_EQ(vkBeginCommandBuffer(commands->commands, &begin), VK_SUCCESS);
+        ASSERT_GT(gpu.record(commands->commands)->dispatches, 0u);
+        ASSERT_EQ(vkEndCommandBuffer(commands->commands), VK_SUCCESS);
+    }
+    // Updates until limits leave nothing for later.
+    static void submitAll(Runtime& gpu) {
+        for (;;) {
+            const auto sent = gpu.submit();
+            ASSERT_TRUE(sent) << sent.error().message;
+            if (sent->receivers_waiting == 0) return;
+        }
+    }
 };
+
+// A budget, and a tolerance that is so small that nothing which shows is put off.
+const UpdateLimits waiting_limits[] = {{.receivers_max = 300}, {.tolerance_quanta = 1e-9f}};
 
 TEST_F(AsyncTest, TwoSetsOfPagesTakeTurnsAndBothCatchUp) {
     const Pack pack = packOf(test::randomPack(61));
@@ -103,17 +124,17 @@ TEST_F(AsyncTest, ABudgetConvergesInPlace) {
     }
 }
 
-// With two sets of pages a state is shown when all of it is there, even while the next one comes in.
-TEST_F(AsyncTest, ABudgetWithTwoSetsOfPagesShowsWholeStates) {
+// With two sets of pages a state is shown when all of it is there, even while the next one comes in: whether the budget
+// stays or goes with each frame.
+void AsyncTest::showWholeStates(uint32_t budget_step) {
     const Pack pack = packOf(test::randomPack(64, {.doors = 0}));
+    ASSERT_GT(pack.contributions()[3].receivers, 600u) << "a budget must be less than what changes in every frame";
     Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
-    ASSERT_TRUE(gpu.setLimits({.receivers_max = 500}));
-    CpuRuntime cpu(pack);  // what is shown: the base
     uint32_t shown = gpu.pageSet(), states = 0;
     CpuRuntime begun(pack);  // what is being written: the state at its first update
-    for (int frame = 0; frame < 60; ++frame) {
-        const float weight = static_cast<float>(frame % 7) / 8;
-        ASSERT_TRUE(gpu.setWeight(LightSet{3}, weight));
+    for (uint32_t frame = 0; frame < 120; ++frame) {
+        ASSERT_TRUE(gpu.setLimits({.receivers_max = 500 + frame % 3 * budget_step}));
+        ASSERT_TRUE(gpu.setWeight(LightSet{3}, static_cast<float>(frame) / 128));
         const bool begins = frame == 0 || gpu.pageSet() != shown;
         if (begins) {
             shown = gpu.pageSet();
@@ -127,6 +148,14 @@ TEST_F(AsyncTest, ABudgetWithTwoSetsOfPagesShowsWholeStates) {
         }
     }
     EXPECT_GT(states, 5u);
+}
+
+TEST_F(AsyncTest, ABudgetWithTwoSetsOfPagesShowsWholeStates) {
+    showWholeStates(0);
+}
+
+TEST_F(AsyncTest, ABudgetThatGoesWithTheFrameShowsWholeStates) {
+    showWholeStates(40);
 }
 
 // Light probes are not limited: each update brings them, while the pages' state is still coming in.
@@ -193,31 +222,56 @@ TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpFor) {
     PackData data = test::randomPack(69);
     test::addRandomProbes(data, random);
     const Pack pack = packOf(std::move(data));
-    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
-        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
-        CpuRuntime cpu(pack);
-        ASSERT_TRUE(gpu.submit());
-        cpu.update();
-        const uint32_t shown = gpu.pageSet();
-        for (int round = 0; round < 3; ++round) {
-            const std::string state = test::randomState(pack.data(), random);
-            ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
-            auto commands = createCommandBuffer(device().context().device, device().context().queue_family);
-            ASSERT_TRUE(commands);
-            VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
-            ASSERT_EQ(vkBeginCommandBuffer(commands->commands, &begin), VK_SUCCESS);
-            ASSERT_GT(gpu.record(commands->commands)->dispatches, 0u);
-            ASSERT_EQ(vkEndCommandBuffer(commands->commands), VK_SUCCESS);
-            gpu.discardRecorded();
-            gpu.discardRecorded();  // once is enough
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double})
+        for (const UpdateLimits& limits : {UpdateLimits{}, waiting_limits[0], waiting_limits[1]}) {
+            Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+            CpuRuntime cpu(pack);
+            ASSERT_TRUE(gpu.setLimits(limits));
+            submitAll(gpu);
+            cpu.update();
+            const uint32_t shown = gpu.pageSet();
+            for (int round = 0; round < 3; ++round) {
+                const std::string state = test::randomState(pack.data(), random);
+                ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+                recordInVain(gpu);
+                gpu.discardRecorded();
+                gpu.discardRecorded();  // once is enough
+            }
+            EXPECT_EQ(gpu.pageSet(), shown);
+            submitAll(gpu);
+            gpu.discardRecorded();  // what was sent stays
+            cpu.update();
+            expectEqualPages(gpu, cpu);
+            EXPECT_TRUE(std::ranges::equal(gpu.readPages()->probes, cpu.probes()));
         }
-        EXPECT_EQ(gpu.pageSet(), shown);
-        ASSERT_TRUE(gpu.submit());
-        gpu.discardRecorded();  // what was sent stays
-        cpu.update();
-        expectEqualPages(gpu, cpu);
-        EXPECT_TRUE(std::ranges::equal(gpu.readPages()->probes, cpu.probes()));
-    }
+}
+
+// Both sets of pages hold the light whose records go, before the recording that never runs or after it.
+TEST_F(AsyncTest, ARecordingThatNeverRunsBringsNothingBackThatWasDropped) {
+    const Pack pack = packOf(test::randomPack(71, {.doors = 0}));
+    CpuRuntime cpu(pack);
+    ASSERT_TRUE(cpu.apply("all=0.25,set2=0"));
+    cpu.update();
+    for (const UpdateLimits& limits : waiting_limits)
+        for (const bool before : {true, false}) {
+            Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+            ASSERT_TRUE(gpu.setLimits(limits));
+            for (const char* state : {"all=1", "all=0.5"}) {
+                ASSERT_TRUE(gpu.apply(state));
+                submitAll(gpu);
+            }
+            if (before) {
+                ASSERT_TRUE(gpu.dropRecords(LightSet{2}));
+            }
+            ASSERT_TRUE(gpu.apply("all=0.25"));
+            recordInVain(gpu);
+            if (!before) {
+                ASSERT_TRUE(gpu.dropRecords(LightSet{2}));
+            }
+            gpu.discardRecorded();
+            submitAll(gpu);
+            expectEqualPages(gpu, cpu);
+        }
 }
 
 TEST_F(AsyncTest, FiguresOfAnUpdateOutliveIdleOnes) {

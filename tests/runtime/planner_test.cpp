@@ -4,8 +4,10 @@
 
 #include "random_pack.h"
 
+#include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace dimmer {
 namespace {
@@ -187,6 +189,80 @@ TEST(Planner, AfterARollbackTheNextPlanRepeatsTheWork) {
     ASSERT_TRUE(planner.plan());
     planner.rollback();
     planner.setElement(2, 0.5f);
+    EXPECT_FALSE(planner.plan());
+}
+
+// With limits, what was planned in vain waits: with the weights of now, not with those that came back.
+TEST(Planner, AfterARollbackNoStateOfBeforeGoesOn) {
+    const PackData data = setsOnly(6);
+    for (const UpdateLimits& limits : {UpdateLimits{.receivers_max = 64}, UpdateLimits{.tolerance_quanta = 0.5f}}) {
+        Planner planner(data);
+        planner.setLimits(limits);
+        ASSERT_TRUE(planner.plan());
+        planner.rollback();
+        EXPECT_TRUE(planner.waiting());
+        EXPECT_FALSE(planner.mayGoOn());
+        ASSERT_TRUE(planner.plan());
+        EXPECT_FALSE(planner.work().terms.empty()) << "everything is on, but was off before";
+    }
+}
+
+TEST(Planner, AnotherBudgetGoesOnWithWhatWaits) {
+    const PackData data = setsOnly(7);
+    Planner planner(data);
+    planner.setLimits({.receivers_max = 256});
+    ASSERT_TRUE(planner.plan());
+    for (const uint32_t batches : {2u, 8u}) {
+        planner.setLimits({.receivers_max = batches * batch_receivers_max});
+        ASSERT_TRUE(planner.mayGoOn());
+        ASSERT_TRUE(planner.planWaiting());
+        EXPECT_EQ(planner.stats().batches, batches);
+    }
+    planner.setLimits({.receivers_max = 512, .tolerance_quanta = 1});
+    EXPECT_FALSE(planner.mayGoOn());
+    ASSERT_TRUE(planner.plan());
+    EXPECT_TRUE(planner.mayGoOn());
+    planner.setLimits({.receivers_max = 0, .tolerance_quanta = 1});
+    EXPECT_FALSE(planner.mayGoOn()) << "without a limit the next update brings everything as it is now";
+}
+
+// Held against a sort of everything that waits, ties and what is taken in parts included.
+TEST(Planner, ABudgetTakesTheMostUrgentInOrder) {
+    const PackData data = setsOnly(8);
+    const std::vector<float> quanta = quantaPerWeight(data);
+    struct Waits {
+        uint32_t cluster, batches;
+        float quanta, plans;
+    };
+    std::vector<Waits> waits;
+    for (uint32_t i = 0; i < data.clusters.size(); ++i) {
+        const Cluster& c = data.clusters[i];
+        waits.push_back({i, c.batch_count, 0, 1});
+        for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) waits.back().quanta += quanta[t];
+    }
+    Planner planner(data);
+    planner.setLimits({.receivers_max = 5 * batch_receivers_max});
+    while (!waits.empty()) {
+        std::ranges::sort(waits, {}, [](const Waits& w) {
+            return std::pair(-(std::min(w.quanta, 1023.0f) + 1) * w.plans * w.plans, w.cluster);
+        });
+        std::map<uint32_t, uint32_t> expected, taken;  // batches per cluster
+        uint32_t left = 5;
+        for (Waits& w : waits) {
+            const uint32_t batches = std::min(w.batches, left);
+            if (batches == 0) break;
+            expected[w.cluster] = batches;
+            w.quanta *= 1 - static_cast<float>(batches) / static_cast<float>(w.batches);
+            w.plans = 1;
+            w.batches -= batches;
+            left -= batches;
+        }
+        std::erase_if(waits, [](const Waits& w) { return w.batches == 0; });
+        for (Waits& w : waits) ++w.plans;
+        ASSERT_TRUE(planner.plan());
+        for (const WorkItem& item : planner.work().items) ++taken[item.cluster];
+        ASSERT_EQ(taken, expected);
+    }
     EXPECT_FALSE(planner.plan());
 }
 

@@ -2,6 +2,7 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 #include <gmock/gmock.h>
+#include <gpu/texel_blender.h>
 #include <update/record_pool.h>
 
 #include "gpu_fixture.h"
@@ -51,6 +52,23 @@ TEST(RecordPool, RandomHistoriesNeverOverlap) {
     }
     for (const auto& [first, count] : held) pool.release(first, count);
     EXPECT_EQ(pool.largestFree(), 1000u);
+}
+
+// A device that reads half of the records as one buffer will do where no more are loaded at a time.
+TEST(TexelLimits, RecordsThatAreNeverLoadedTogetherNeedNoRoomTogether) {
+    const PackData data = test::randomPack(79);
+    const DevicePlaces places = placesOf(data);
+    const Planner planner(data);
+    const uint64_t half = places.records * sizeof(TexelRecord) / 2;
+    VkPhysicalDeviceLimits limits{};
+    limits.maxTexelBufferElements = static_cast<uint32_t>(half / 16);
+    EXPECT_TRUE(checkTexelLimits(limits, places, planner, half / 16 * 16));
+    for (const uint64_t bytes_max : {uint64_t{0}, half + 16, 3 * half}) {
+        const auto refused = checkTexelLimits(limits, places, planner, bytes_max);
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+        EXPECT_THAT(refused.error().message, HasSubstr("records_bytes_max"));
+    }
 }
 
 class RecordsTest : public test::GpuTest {

@@ -2,9 +2,12 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 #include <gmock/gmock.h>
+#include <gpu/lightmap_pages.h>
 
 #include "gpu_fixture.h"
 #include "pages.h"
+
+#include <limits>
 
 namespace dimmer {
 namespace {
@@ -129,6 +132,41 @@ TEST_F(RuntimeTest, NothingChangedIsNoDispatchAndNoSubmission) {
     EXPECT_EQ(runtime.semaphoreValue(), value);
     EXPECT_EQ(runtime.record(VK_NULL_HANDLE)->dispatches, 0u);  // touches no command buffer
     EXPECT_EQ(runtime.semaphoreValue(), value);
+}
+
+TEST_F(RuntimeTest, WhatWasPutOffIsCountedWhereNothingElseWas) {
+    const Pack pack = packOf(test::randomPack(15));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    ASSERT_TRUE(gpu.submit());
+    cpu.update();
+    const UpdateLimits limits{.tolerance_quanta = std::numeric_limits<float>::max()};
+    ASSERT_TRUE(gpu.setLimits(limits) && cpu.setLimits(limits));
+    for (const bool records : {false, true}) {
+        const char* state = records ? "set3=0.25" : "set3=0.5";
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        const auto stats = records ? gpu.record(VK_NULL_HANDLE) : gpu.submit();
+        ASSERT_TRUE(stats) << stats.error().message;
+        const UpdateStats expected = cpu.update();
+        expectEqualCounts(*stats, expected);
+        EXPECT_EQ(stats->dispatches, 0u);
+        EXPECT_GT(stats->clusters_put_off, 0u);
+        EXPECT_EQ(stats->clusters_put_off, expected.clusters_put_off);
+    }
+}
+
+// 32 pages of 64 MiB are all that the device takes as one image.
+TEST(PageLimits, LargerImagesThanTheDeviceHasAreRefused) {
+    VkImageFormatProperties limits{};
+    limits.maxExtent = {4096, 4096, 1};
+    limits.maxArrayLayers = 256;
+    limits.maxResourceSize = VkDeviceSize{1} << 31;
+    EXPECT_TRUE(checkPageLimits(limits, 4096, 4096, 32));
+    const auto refused = checkPageLimits(limits, 4096, 4096, 33);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("fewer texels per metre"));
+    EXPECT_FALSE(checkPageLimits(limits, 4097, 1, 1));
 }
 
 TEST_F(RuntimeTest, WaitTellsTheTimeOnTheGpu) {

@@ -267,16 +267,19 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
 /* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
 
 /* Records the update into the caller's command buffer, outside a render pass, with the barriers that let fragment and
- * compute shaders sample afterwards. Nothing changed: nothing is recorded. The submission must have completed before
- * the next recording. */
+ * compute shaders sample afterwards. Nothing changed: nothing is recorded (0 dispatches). A call that records
+ * overwrites what the last recording's commands read: their submission must have completed, and the fence of two frames
+ * ago does not say that. With several frames in flight, use dimmer_lights_submit(). */
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
 /* What was recorded last will never run (a frame was given up): the next update does its work. */
 dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights);
 
-/* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. */
+/* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. A later call
+ * waits for the earlier one's update, but not for what was recorded. */
 dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats);
-/* The same, once `semaphore` (null: nothing) is signalled, with `value` if it is a timeline semaphore: with a queue of
- * its own an update must wait for the frames that sample what it writes. */
+/* The same, once `semaphore` (null: nothing) has `value`: with a queue of its own an update must wait for the frames
+ * that sample what it writes. Timeline semaphores only: where nothing changed, nothing is submitted and nothing waits,
+ * and a binary semaphore would stay signalled. */
 dimmer_result dimmer_lights_submit_after(dimmer_lights* lights, VkSemaphore semaphore, uint64_t value,
                                          dimmer_update_stats* stats);
 /* Blocks until what was submitted is done, and gives the last update's figures, its time on the GPU included. */
@@ -298,7 +301,8 @@ typedef struct dimmer_images {
  * grid's tables; VK_NULL_HANDLE where there are none. With DIMMER_DOUBLE_BUFFERED, ask after each update. */
 dimmer_result dimmer_lights_get_probe_buffers(const dimmer_lights* lights, VkBuffer* probes, VkBuffer* grid_table);
 
-/* What to sample after the last update; with DIMMER_DOUBLE_BUFFERED, ask after each. */
+/* What to sample after the last update; with DIMMER_DOUBLE_BUFFERED, ask after each, even after one of 0 dispatches:
+ * where the other set of pages held the state already, it is shown without a recording. */
 dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images);
 
 #endif

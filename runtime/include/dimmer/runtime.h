@@ -6,7 +6,6 @@
 #include <vulkan/vulkan.h>
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 namespace dimmer {
@@ -75,9 +74,10 @@ struct LoadProgress {
 };
 
 // What an update of submit() waits for: a semaphore that says that the frames which sampled the pages are done.
+// Timeline semaphores only: where nothing changed nothing waits, and a binary semaphore would stay signalled.
 struct SubmitWait {
     VkSemaphore semaphore = VK_NULL_HANDLE;  // null: nothing
-    uint64_t value = 0;                      // for a timeline semaphore
+    uint64_t value = 0;
 };
 
 // What a runtime keeps on the device between updates.
@@ -98,15 +98,20 @@ class Runtime : public LightState {
 
     // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
     // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. Nothing
-    // changed: records nothing. The submission of one recording must have completed on the GPU before the next one;
-    // with two sets of pages and no limits, before the next but one.
+    // changed: records nothing (0 dispatches). A call that records overwrites the work lists that the last recording's
+    // commands read, so that one's submission must have completed on the GPU. The fence of two frames ago does not say
+    // that: with several frames in flight, submit() is the way. Buffering::Double has work lists for each set, and a
+    // call writes the sets pageSet() ^ 1 and probeSet() ^ 1, as they were before it: the last recording that wrote
+    // either must have completed. That may be the last one of all: under limits, or after sets changed places without
+    // a recording (see images()).
     Expected<UpdateStats> record(VkCommandBuffer commands);
     // The commands of the last record() will never run (a frame was given up): the next update does their work.
     void discardRecorded();
 
     // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
-    // own. Returns at once; a later call waits for the earlier update. Nothing changed: no submission, and no wait.
-    // Where the pages to write were sampled on another queue, `wait` must say when that is done.
+    // own. Returns at once; a later call waits for the earlier update, but not for what was record()ed, which must have
+    // completed. Nothing changed: no submission, no wait, and `wait` is not waited for. Where the pages to write
+    // were sampled on another queue, `wait` must say when that is done.
     Expected<UpdateStats> submit(const SubmitWait& wait = {});
     // The timeline semaphore of submit() and the value that its last submission signals.
     VkSemaphore semaphore() const;
@@ -117,7 +122,8 @@ class Runtime : public LightState {
 
     // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
     // the next update takes its light off the pages. What was record()ed before must have been submitted, and have
-    // completed where submit() has another queue. Unsupported in modes gather and scatter.
+    // completed where submit() has another queue; or it never runs (discardRecorded()). Unsupported in modes gather and
+    // scatter.
     Expected<void> dropRecords(LightSet set);
     // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room.
     // Loaded, the set is at 0 and takes any weight.
@@ -128,7 +134,8 @@ class Runtime : public LightState {
     // loads.
     Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
 
-    // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns; the
+    // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns, even
+    // after one of 0 dispatches: where the other set held the state already, it is shown without a recording. The
     // other set is pageSet() ^ 1, for descriptors that are written once.
     LightmapImages images() const { return images(pageSet()); }
     LightmapImages images(uint32_t page_set) const;
@@ -156,7 +163,7 @@ class Runtime : public LightState {
     Runtime(const Pack& pack, std::unique_ptr<Impl> impl, uint32_t moving_probes_max);
     void planTexels(UpdateStats& stats);
     void planProbes(UpdateStats& stats);
-    std::optional<UpdateStats> planNext();
+    bool planNext(UpdateStats& stats);
     void rollback();
     const Planner* plannedProbes() const;
     Expected<void> checkLoadable(LightSet set) const;
