@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 #include <scene/gltf_file.h>
 #include <scene/json_types.h>
+#include <scene/uri.h>
 
 #include <algorithm>
 #include <cstring>
 #include <fstream>
 #include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <span>
 
 namespace dimmer::cook {
@@ -75,22 +78,61 @@ size_t deepestNesting(std::string_view json) {
     return deepest;
 }
 
+// Files that the level names.
+struct ExternalFiles {
+    std::string folder;
+    std::map<std::string, std::string> meant;  // by the path that the parser makes of a URI, the one that it means
+    std::map<std::string, size_t> length;      // per such path, what all buffers there have
+};
+
+// The parser takes a '+' for a blank, and a buffer's file that is longer than the buffer for an error; it may be longer
+// (glTF 2.0 specification, "Buffers and Buffer Views").
+ExternalFiles externalFiles(std::string_view gltf_json, std::string folder) {
+    ExternalFiles files{std::move(folder), {}, {}};
+    const auto json = nlohmann::json::parse(gltf_json, nullptr, false);
+    for (const char* list : {"buffers", "images"}) {
+        const auto all = json.is_object() ? json.find(list) : json.end();
+        if (all == json.end() || !all->is_array()) continue;
+        for (const nlohmann::json& file : *all) {
+            if (!file.is_object() || !file.contains("uri") || !file["uri"].is_string()) continue;
+            const std::string uri = file["uri"].get<std::string>();
+            if (uri.starts_with("data:")) continue;
+            std::string parsed = uri;
+            std::ranges::replace(parsed, '+', ' ');
+            const std::string path = files.folder + "/" + percentDecoded(uri);
+            files.meant[files.folder + "/" + percentDecoded(parsed)] = path;
+            if (list != std::string_view("buffers") || !file.contains("byteLength")) continue;
+            if (!file["byteLength"].is_number_unsigned()) continue;
+            const auto bytes = file["byteLength"].get<size_t>();
+            if (const auto [known, fresh] = files.length.try_emplace(path, bytes); !fresh && known->second != bytes)
+                known->second = std::numeric_limits<size_t>::max();
+        }
+    }
+    return files;
+}
+
 // tinygltf looks for external files next to the level and then in the working directory. Only the first is meant:
 // a level must not depend on where the cooker was started.
-bool isBesideLevel(const std::string& path, void* level_folder) {
-    return path.starts_with(*static_cast<const std::string*>(level_folder) + "/");
+bool isBesideLevel(const std::string& path, void* files) {
+    return path.starts_with(static_cast<const ExternalFiles*>(files)->folder + "/");
 }
 
-std::string keepPath(const std::string& path, void*) {
-    return path;
+std::string meantPath(const std::string& path, void* files) {
+    const auto& meant = static_cast<const ExternalFiles*>(files)->meant;
+    const auto found = meant.find(path);
+    return found == meant.end() ? path : found->second;
 }
 
-bool readExternal(Bytes* out, std::string* message, const std::string& path, void*) {
+bool readExternal(Bytes* out, std::string* message, const std::string& path, void* files) {
     Expected<Bytes> bytes = readFile(path);
-    if (bytes)
+    if (bytes) {
         *out = std::move(*bytes);
-    else if (message)
+        const auto& length = static_cast<const ExternalFiles*>(files)->length;
+        if (const auto known = length.find(path); known != length.end() && known->second < out->size())
+            out->resize(known->second);
+    } else if (message) {
         *message = bytes.error().message;
+    }
     return bytes.has_value();
 }
 
@@ -112,17 +154,17 @@ std::string oneLine(std::string text) {
     return text;
 }
 
-Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, const std::string& folder, const std::string& file) {
+Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, ExternalFiles files, const std::string& file) {
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keepEncoded, nullptr);
-    std::string level_folder = folder;
-    parser.SetFsCallbacks({isBesideLevel, keepPath, readExternal, nullptr, &level_folder});
+    parser.SetFsCallbacks({isBesideLevel, meantPath, readExternal, nullptr, &files});
     tinygltf::Model model;
     std::string message, ignored;
     const auto size = static_cast<unsigned>(bytes.size());
-    const bool parsed = glb ? parser.LoadBinaryFromMemory(&model, &message, &ignored, bytes.data(), size, folder)
-                            : parser.LoadASCIIFromString(&model, &message, &ignored,
-                                                         reinterpret_cast<const char*>(bytes.data()), size, folder);
+    const bool parsed =
+        glb ? parser.LoadBinaryFromMemory(&model, &message, &ignored, bytes.data(), size, files.folder)
+            : parser.LoadASCIIFromString(&model, &message, &ignored, reinterpret_cast<const char*>(bytes.data()), size,
+                                         files.folder);
     // Some errors are reported by message alone, with the offending part left out.
     if (parsed && message.empty()) return model;
     return fail(ErrorCode::BadInput, fmt::format("{}: is not a usable glTF file: {}. Export it again, or have a glTF "
@@ -177,7 +219,7 @@ Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
     const std::string folder = std::filesystem::absolute(path).parent_path().string();
     try {
         if (auto ok = checkTypes(json, file); !ok) return std::unexpected(ok.error());
-        Expected<tinygltf::Model> model = parse(*bytes, glb, folder, file);
+        Expected<tinygltf::Model> model = parse(*bytes, glb, externalFiles(json, folder), file);
         if (model && !model->asset.version.starts_with("2"))
             return fail(ErrorCode::BadInput,
                         fmt::format("{}: is glTF {}. Export it as glTF 2.0.", file, oneLine(model->asset.version)));

@@ -1,4 +1,5 @@
 #include <scene/ies_light.h>
+#include <scene/uri.h>
 
 #include <scene/gltf_file.h>
 
@@ -13,22 +14,6 @@ namespace {
 constexpr const char* extension_name = "EXT_lights_ies";
 
 using Bytes = std::vector<unsigned char>;
-
-// RFC 3986: %20 and its like.
-std::string percentDecoded(const std::string& uri) {
-    std::string path;
-    for (size_t i = 0; i < uri.size(); ++i) {
-        unsigned char byte = 0;
-        const char* const digits = uri.data() + i + 1;
-        if (uri[i] == '%' && i + 2 < uri.size() && std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2) {
-            path += static_cast<char>(byte);
-            i += 2;
-        } else {
-            path += uri[i];
-        }
-    }
-    return path;
-}
 
 // The parser decodes data of media types that it knows alone; any base64 will do here.
 bool decodeDataUri(const std::string& uri, Bytes& bytes) {

@@ -45,6 +45,23 @@ TEST(SceneGeometry, ExternalBuffer) {
     expectNear(scene->meshes[0].positions_m[2], {1, 0, 1});
 }
 
+// A plus is a plus, and a buffer's file may be longer than the buffer: exporters pad.
+TEST(SceneGeometry, BuffersMayHaveAPlusInTheirNameAndBytesToSpare) {
+    const TemporaryFolder folder;
+    LevelFile level = LevelFile::withFloor();
+    level.document["buffers"] = json::array({{{"byteLength", level.buffer.size()}, {"uri", "a+b%2Bc.bin"}}});
+    std::vector<uint8_t> padded(level.buffer.begin(), level.buffer.end());
+    padded.insert(padded.end(), 5, 0xee);
+    folder.write("a+b+c.bin", padded.data(), padded.size());
+    const std::string text = level.document.dump();
+    const auto scene = importLevel(folder.write("level.gltf", text.data(), text.size()));
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->meshes.size(), 1u);
+    // Shorter is no buffer.
+    folder.write("a+b+c.bin", padded.data(), 7);
+    expectBadInput(importLevel(folder.path / "level.gltf"), {"a+b+c.bin"});
+}
+
 TEST(SceneGeometry, NodesMoveRotateAndScaleInThatOrderDownTheTree) {
     LevelFile level = LevelFile::withFloor();
     const float half = std::numbers::sqrt2_v<float> / 2;
