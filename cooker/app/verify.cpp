@@ -84,8 +84,7 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
     if (!r.doors.empty())
         fmt::print(
             "error: sum |dE - dE_ref| / sum |dE_ref| where dE_ref is surely not 0, and its standard error by the "
-            "choice "
-            "of places;\nelsewhere: the same sum where dE_ref may be 0 and the pack is surely wrong\n");
+            "choice of places;\nelsewhere: the same sum where dE_ref may be 0 and the pack is surely wrong\n");
 }
 
 nlohmann::ordered_json toJson(const ErrorFigures& f) {

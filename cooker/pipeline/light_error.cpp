@@ -71,7 +71,10 @@ EffectFigures effectError(std::span<const LightPair> pairs) {
         noise += normal_mean_magnitude * p.reference_error_lux;
         out.reference_sum_lux += std::abs(p.reference_lux);
     }
-    if (out.points == 0) return out;
+    if (out.points == 0) {
+        out.elsewhere = elsewhere > 0 ? 1 : 0;
+        return out;
+    }
     out.measured_error = magnitude / out.reference_sum_lux;
     out.reference_noise = noise / out.reference_sum_lux;
     out.error = withoutNoise(out.measured_error, out.reference_noise);

@@ -38,7 +38,9 @@ struct EffectFigures {
     double bias = 0;   // sum (dE - dE_ref) / sum |dE_ref|
     double measured_error = 0, reference_noise = 0;
     double sampling_error = 0;  // standard error of measured_error: other points would give another
-    double elsewhere = 0;  // sum |dE - dE_ref| / the same sum where dE_ref may be nothing and dE surely is not dE_ref
+    // Sum |dE - dE_ref| where dE_ref may be nothing and dE surely is not dE_ref, over the same sum |dE_ref|; 1 where no
+    // point counts: then all that the element does is invented.
+    double elsewhere = 0;
     double reference_sum_lux = 0;
     size_t points = 0;  // that count
 };

@@ -120,6 +120,7 @@ TEST(VerifyDoors, LightThatThePackInventsIsFound) {
     const auto away = std::ranges::find(doors, "away", lightOf);
     ASSERT_NE(away, doors.end());
     EXPECT_EQ(away->effect.points, 0u);
+    EXPECT_EQ(away->effect.elsewhere, 1);
     for (const char* door : {"near", "far"}) {
         const auto all =
             std::ranges::find(doors, Row(door, "all"), [](const auto& d) { return Row(d.door, lightOf(d)); });
