@@ -130,6 +130,13 @@ void printGrid(const PackData& d, const PackCost& cost) {
     }
 }
 
+// At texels and probes.
+uint64_t recordBytes(const PackData& d, size_t contribution) {
+    const auto& probes = d.probes.record_counts;
+    return d.contributions[contribution].receivers * sizeof(TexelRecord) +
+           (probes.empty() ? 0 : probes[contribution] * sizeof(ProbeRecord));
+}
+
 nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
     nlohmann::ordered_json j;
     j["format_version"] = format::version;
@@ -155,19 +162,22 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     for (uint32_t p = 0; p < d.page_count; ++p)
         j["pages"].push_back({{"width", d.page_width}, {"height", d.page_height}});
     j["contributions"] = nlohmann::ordered_json::array();
-    for (const Contribution& c : d.contributions)
+    for (size_t k = 0; k < d.contributions.size(); ++k) {
+        const Contribution& c = d.contributions[k];
         j["contributions"].push_back({{"light", lightName(d, c)},
                                       {"doors_open", elementNames(d, c.doors_open)},
                                       {"doors_closed", elementNames(d, c.doors_closed)},
                                       {"receivers", c.receivers},
-                                      {"bytes", uint64_t{c.receivers} * sizeof(TexelRecord)},
+                                      {"bytes", recordBytes(d, k)},
                                       {"energy_dropped", c.energy_dropped}});
+    }
     j["elements"] = nlohmann::ordered_json::array();
     for (const ElementCost& e : cost.elements)
         j["elements"].push_back({{"name", d.elements[e.element].name},
                                  {"kind", isDoor(d, e.element) ? "door" : "set"},
                                  {"receivers", e.receivers},
-                                 {"bytes", e.bytes}});
+                                 {"bytes", e.bytes},
+                                 {"probe_bytes", e.probe_bytes}});
     j["clusters"] = d.clusters.size();
     j["batches"] = d.batches.size();
     j["mixed_batches"] = 0;
@@ -187,10 +197,9 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
     printGrid(d, cost);
     printModels(d, cost);
     fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
-    for (const Contribution& c : d.contributions)
-        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, c), c.receivers,
-                   humanBytes(uint64_t{c.receivers} * sizeof(TexelRecord)),
-                   100 * static_cast<double>(c.energy_dropped));
+    for (size_t k = 0; k < d.contributions.size(); ++k)
+        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, d.contributions[k]), d.contributions[k].receivers,
+                   humanBytes(recordBytes(d, k)), 100 * static_cast<double>(d.contributions[k].energy_dropped));
     fmt::print("\n{:<26} {:>12}\n", "overlap", "texels");
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n)
         fmt::print("{:<26} {:>12}\n", n, cost.overlap_histogram[n]);

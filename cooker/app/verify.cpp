@@ -71,8 +71,9 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
         fmt::print("\n{:<26} {:>8} {:>8} {:>8} {:>10} {:>14}\n", "light set, alone", "error", "bias", "points",
                    "ref. noise", "energy dropped");
     for (const SetReport& s : r.sets)
-        fmt::print("{:<26} {:>6.2f} % {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name, 100 * s.effect.error,
-                   100 * s.effect.bias, s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
+        fmt::print("{:<26} {:>8} {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name,
+                   s.effect.points == 0 ? "-" : fmt::format("{:.2f} %", 100 * s.effect.error), 100 * s.effect.bias,
+                   s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
     if (options.doors && r.doors.empty()) fmt::print("\ndoors: the level has none that the state leaves closed\n");
     if (!r.doors.empty())
         fmt::print("\n{:<16} {:<20} {:>17} {:>8} {:>8} {:>10} {:>10} {:>18}\n", "door, opened", "light", "error",

@@ -462,7 +462,9 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     if (options.quality_is_chosen) profile->origin["quality"] = "command line";
     const auto unknown = resolveSettings(*profile, *scene, options.set);
     if (!unknown) return std::unexpected(unknown.error());
-    result.stats.warnings.insert(result.stats.warnings.end(), unknown->begin(), unknown->end());
+    // The scene's, too: a pack in the cache is that of the same warnings.
+    for (auto* warnings : {&result.stats.warnings, &scene->warnings})
+        warnings->insert(warnings->end(), unknown->begin(), unknown->end());
     result.profile = *profile;
     auto cache = openCache(options, result.stats);
     const auto bytes = findOrMakePack(*scene, options, progress, cache ? &*cache : nullptr, result);

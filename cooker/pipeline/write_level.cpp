@@ -246,21 +246,20 @@ class LevelWriter {
                                       "/occlusionTexture", "/emissiveTexture"})
                 if (const Json::json_pointer place(other); material.contains(place))
                     if (!followsBase(material[place], wanted))
-                        warnings_.push_back(fmt::format(
-                            "material '{}': {} wants TEXCOORD_{}, which is not written; TEXCOORD_0 is the "
-                            "base colour's now, TEXCOORD_1 the lightmap's",
-                            material.value("name", ""), place.back(), material[place].value("texCoord", size_t{0})));
+                        warnings_.push_back(
+                            fmt::format("material '{}': {} wants TEXCOORD_{}, which is not written; TEXCOORD_0 is the "
+                                        "base colour's now, TEXCOORD_1 the lightmap's",
+                                        material.value("name", ""), place.back(), coordinatesOf(material[place])));
         }
     }
 
     // Returns the coordinates that it wanted.
     size_t normaliseBase(const Json& material, Json& texture) {
-        size_t wanted = texture.value("texCoord", size_t{0});
+        const size_t wanted = coordinatesOf(texture);
         texture.erase("texCoord");
         if (!texture.contains("extensions")) return wanted;
         const Json::json_pointer transform("/extensions/KHR_texture_transform");
         if (texture.contains(transform)) {
-            wanted = texture[transform].value("texCoord", wanted);
             texture["extensions"].erase("KHR_texture_transform");
             warnings_.push_back(
                 fmt::format("material '{}': its texture's transform is in TEXCOORD_0 now; textures "
@@ -271,10 +270,17 @@ class LevelWriter {
         return wanted;
     }
 
+    static size_t coordinatesOf(const Json& texture) {
+        const Json::json_pointer own("/extensions/KHR_texture_transform/texCoord");
+        return texture.contains(own) ? texture[own].get<size_t>() : texture.value("texCoord", size_t{0});
+    }
+
     // Points it to where the base colour's coordinates are now, if it shares them.
     static bool followsBase(Json& texture, size_t wanted) {
-        if (texture.value("texCoord", size_t{0}) != wanted) return false;
+        if (coordinatesOf(texture) != wanted) return false;
         texture.erase("texCoord");
+        const Json::json_pointer transform("/extensions/KHR_texture_transform");
+        if (texture.contains(transform)) texture[transform].erase("texCoord");
         return true;
     }
 

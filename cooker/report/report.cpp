@@ -246,7 +246,8 @@ class Report {
             body_ += "</table></div>\n";
             const auto effects = [&](const char* key, std::string_view header, std::vector<const char*> names) {
                 if (!v.contains(key) || !v[key].is_array() || v[key].empty()) return;
-                body_ += fmt::format("<div class=scroll><table><tr>{}<th>error<th>bias<th>reference noise\n", header);
+                body_ += fmt::format(
+                    "<div class=scroll><table><tr>{}<th>error<th>bias<th>reference noise<th>elsewhere\n", header);
                 for (const nlohmann::json& row : v[key]) {
                     const auto named = [&](const char* name) {
                         return row.is_object() && row.contains(name) && row[name].is_string();
@@ -254,8 +255,11 @@ class Report {
                     if (!std::ranges::all_of(names, named)) continue;
                     body_ += "<tr>";
                     for (const char* name : names) body_ += "<td>" + escaped(row[name].get<std::string>());
-                    body_ += fmt::format("<td>{}<td>{}<td>{}\n", number(row, "error"), number(row, "bias"),
-                                         number(row, "reference_noise"));
+                    // Nothing of the reference's counts: then there is no share of it.
+                    const bool none = row.contains("points") && row["points"] == 0;
+                    for (const char* share : {"error", "bias", "reference_noise"})
+                        body_ += "<td>" + (none ? "-" : number(row, share));
+                    body_ += fmt::format("<td>{}\n", number(row, "elsewhere"));
                 }
                 body_ += "</table></div>\n";
             };

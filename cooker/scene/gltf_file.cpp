@@ -81,8 +81,9 @@ size_t deepestNesting(std::string_view json) {
 // Files that the level names.
 struct ExternalFiles {
     std::string folder;
-    std::map<std::string, std::string> meant;  // by the path that the parser makes of a URI, the one that it means
-    std::map<std::string, size_t> length;      // per such path, what all buffers there have
+    std::map<std::string, std::string>
+        meant;                             // by the path that the parser makes of a URI, the one that it means, or none
+    std::map<std::string, size_t> length;  // per such path, what all buffers there have
 };
 
 // The parser takes a '+' for a blank, and a buffer's file that is longer than the buffer for an error; it may be longer
@@ -100,7 +101,8 @@ ExternalFiles externalFiles(std::string_view gltf_json, std::string folder) {
             std::string parsed = uri;
             std::ranges::replace(parsed, '+', ' ');
             const std::string path = files.folder + "/" + percentDecoded(uri);
-            files.meant[files.folder + "/" + percentDecoded(parsed)] = path;
+            const auto [meant, first] = files.meant.try_emplace(files.folder + "/" + percentDecoded(parsed), path);
+            if (!first && meant->second != path) meant->second.clear();  // which one is asked for cannot be told
             if (list != std::string_view("buffers") || !file.contains("byteLength")) continue;
             if (!file["byteLength"].is_number_unsigned()) continue;
             const auto bytes = file["byteLength"].get<size_t>();

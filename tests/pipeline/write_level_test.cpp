@@ -157,10 +157,13 @@ TEST(WriteLevel, SaysWhatIsLost) {
     material["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}, {"texCoord", 2}};
     material["normalTexture"] = {{"index", 0}, {"texCoord", 2}};
     material["occlusionTexture"] = {{"index", 0}, {"texCoord", 1}};
+    material["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {
+        {"index", 0}, {"texCoord", 2}, {"extensions", {{"KHR_texture_transform", {{"texCoord", 3}}}}}};
     const Written written(level);
     EXPECT_THAT(written.warnings, testing::Contains(testing::AllOf(testing::HasSubstr("floor"),
                                                                    testing::HasSubstr("COLOR_0 is not written"))));
     EXPECT_THAT(written.warnings, testing::Contains(testing::HasSubstr("occlusionTexture wants TEXCOORD_1")));
+    EXPECT_THAT(written.warnings, testing::Contains(testing::HasSubstr("metallicRoughnessTexture wants TEXCOORD_3")));
     const Glb glb(written.path);
     const json& out = glb.document["materials"][0];
     EXPECT_FALSE(out["normalTexture"].contains("texCoord"));

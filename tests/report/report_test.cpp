@@ -130,7 +130,8 @@ TEST(Report, VerifyAndItsHeatMaps) {
     ReportInput input;
     input.verify = nlohmann::json::parse(
         R"({"surface": {"mean": 0.0123, "p95": 0.05, "bias": -0.01}, "tilted": {"mean": "x"}, "sets": [{"name": "set0", "error": 0.07}],
-            "doors": [{"door": "gate<1>", "light": "always on", "error": 0.0911}, {"door": "nothing else"}, 7]})");
+            "doors": [{"door": "gate<1>", "light": "always on", "error": 0.0911},
+            {"door": "leak", "light": "all", "error": 0, "points": 0, "elsewhere": 1}, {"door": "nothing else"}, 7]})");
     input.heat_maps = folder.path;
     const auto missing = reportHtml(pack, input);
     ASSERT_FALSE(missing);
@@ -140,7 +141,7 @@ TEST(Report, VerifyAndItsHeatMaps) {
     const std::string html = htmlOf(pack, input);
     EXPECT_THAT(html, AllOf(HasSubstr("1.23 %"), HasSubstr("-1.00 %"), HasSubstr("7.00 %"), HasSubstr(base64(*png)),
                             HasSubstr("alt=\"error on page 1\""), HasSubstr("gate&lt;1&gt;<td>always on<td>9.11 %"),
-                            Not(HasSubstr("nothing else"))));
+                            HasSubstr("leak<td>all<td>-<td>-<td>-<td>100.00 %"), Not(HasSubstr("nothing else"))));
 }
 
 using Texel = std::array<uint32_t, 3>;  // page, x, y
