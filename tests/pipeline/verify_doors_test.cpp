@@ -129,8 +129,7 @@ TEST(VerifyDoors, LightThatThePackInventsIsFound) {
     }
 }
 
-// A pack in which nothing comes through scores 100 %: drawn by the pack alone, no place there would have been looked
-// at.
+// A pack in which walls stand in the doorways, and the leaves elsewhere, scores 100 %.
 TEST(VerifyDoors, IgnoringADoorScoresOne) {
     const auto pack = cooked(threeRooms(true), "draft");
     ASSERT_TRUE(pack);
