@@ -10,8 +10,15 @@
 namespace dimmer::sample {
 namespace {
 
-bool idle(const FrameCost& cost) {
-    return cost.stats.dispatches == 0;
+// Nobody touched a light, and no page was blended: all that may have happened is that things moved.
+bool lightsRest(const FrameCost& cost) {
+    return cost.changes.empty() && cost.stats.contributions_changed == 0 && cost.stats.batches == 0;
+}
+bool unchanged(const FrameCost& cost) {
+    return lightsRest(cost) && cost.stats.dispatches == 0;
+}
+bool movedOnly(const FrameCost& cost) {
+    return lightsRest(cost) && cost.stats.dispatches > 0;
 }
 
 template <class Value>
@@ -65,32 +72,38 @@ nlohmann::ordered_json toJson(const UpdateStats& stats) {
 std::vector<CostEvent> CostReport::events() const {
     std::vector<CostEvent> events;
     std::vector<UpdateStats> run;
+    const auto endRun = [&] {
+        if (!events.empty()) events.back().median = median(run);
+        run.clear();
+    };
     for (const FrameCost& cost : frames_) {
-        if (cost.changes.empty() && idle(cost)) continue;
+        if (lightsRest(cost)) continue;
         const std::string what = cost.changes.empty() ? "start" : fmt::format("{}", fmt::join(cost.changes, " + "));
         const bool continues = !events.empty() && events.back().what == what &&
                                events.back().first_frame + events.back().frames == cost.frame;
         if (continues) {
             ++events.back().frames;
         } else {
+            endRun();
             events.push_back({cost.frame, 1, what, {}});
-            run.clear();
         }
         run.push_back(cost.stats);
-        events.back().median = median(run);
     }
+    endRun();
     return events;
 }
 
-UpdateStats CostReport::idleMedian() const {
+QuietFrames CostReport::quiet(bool (*is)(const FrameCost&)) const {
     std::vector<UpdateStats> all;
     for (const FrameCost& cost : frames_)
-        if (idle(cost)) all.push_back(cost.stats);
-    return median(all);
+        if (is(cost)) all.push_back(cost.stats);
+    return {static_cast<uint32_t>(all.size()), median(all)};
 }
-
-uint32_t CostReport::idleFrames() const {
-    return static_cast<uint32_t>(std::count_if(frames_.begin(), frames_.end(), idle));
+QuietFrames CostReport::unchangedFrames() const {
+    return quiet(unchanged);
+}
+QuietFrames CostReport::movingFrames() const {
+    return quiet(movedOnly);
 }
 
 UpdateStats CostReport::total() const {
@@ -119,7 +132,9 @@ std::string CostReport::table(const std::string& device, const std::string& driv
                                        : fmt::format("{}-{}", event.first_frame, event.first_frame + event.frames - 1);
         text += row(frames, event.what, event.median);
     }
-    text += row("", fmt::format("nothing changed: median of {} frames", idleFrames()), idleMedian());
+    for (const auto& [what, quiet] :
+         {std::pair{"nothing changed", unchangedFrames()}, {"things moved", movingFrames()}})
+        if (quiet.frames > 0) text += row("", fmt::format("{}: median of {} frames", what, quiet.frames), quiet.median);
     text += row("", fmt::format("total of {} frames", frames_.size()), total());
     return text +
            "Rows of several frames show the median frame. Measured after one rehearsal: no shader compilation in it.\n";
@@ -134,8 +149,10 @@ Expected<void> CostReport::writeJson(const std::filesystem::path& path, const st
         entry.update(toJson(event.median));
         json["events"].push_back(std::move(entry));
     }
-    json["unchanged"] = toJson(idleMedian());
-    json["unchanged"]["frames"] = idleFrames();
+    for (const auto& [key, quiet] : {std::pair{"unchanged", unchangedFrames()}, {"moved", movingFrames()}}) {
+        json[key] = toJson(quiet.median);
+        json[key]["frames"] = quiet.frames;
+    }
     json["total"] = toJson(total());
 
     std::ofstream file(path);

@@ -24,14 +24,19 @@ struct CostEvent {
     UpdateStats median;
 };
 
+// Frames in which no light was touched and no page blended.
+struct QuietFrames {
+    uint32_t frames = 0;
+    UpdateStats median;
+};
+
 class CostReport {
    public:
     void add(FrameCost cost) { frames_.push_back(std::move(cost)); }
 
     std::vector<CostEvent> events() const;
-    // The same over all frames in which nothing was blended.
-    UpdateStats idleMedian() const;
-    uint32_t idleFrames() const;
+    QuietFrames unchangedFrames() const;  // the runtime had nothing to do
+    QuietFrames movingFrames() const;     // things moved among lights that rest, and were lit anew
     // Sums over all frames.
     UpdateStats total() const;
 
@@ -40,6 +45,8 @@ class CostReport {
                              const std::string& driver) const;
 
    private:
+    QuietFrames quiet(bool (*is)(const FrameCost&)) const;
+
     std::vector<FrameCost> frames_;
 };
 

@@ -14,6 +14,8 @@ constexpr float usual_cd_m2 = 4.0f;
 constexpr float adaptation_share = 0.6f;
 // Darker than this the eye gives up; also keeps a black frame from asking for infinite exposure.
 constexpr float darkest_cd_m2 = 0.02f;
+// What a picture of 16-bit floats holds: brighter than this it says infinite, from which no mean would come back.
+constexpr float brightest_cd_m2 = 65504.0f;
 
 constexpr size_t median_stride = 3;  // pixels; a third of them gives the same median to a hundredth of a stop
 
@@ -61,7 +63,7 @@ float medianLuminance(const RadianceFrame& frame) {
 }
 
 float AutoExposure::update(float median_cd_m2, bool adapted) {
-    const float stops_from_usual = std::log2(std::max(median_cd_m2, darkest_cd_m2) / usual_cd_m2);
+    const float stops_from_usual = std::log2(std::clamp(median_cd_m2, darkest_cd_m2, brightest_cd_m2) / usual_cd_m2);
     const float target = std::log2(middle_grey / usual_cd_m2) - adaptation_share * stops_from_usual;
     const float share = adapted || !(adaptation_s_ > 0) ? 1.0f : 1 - std::exp(-frame_s_ / adaptation_s_);
     log2_exposure_ += share * (target - log2_exposure_);

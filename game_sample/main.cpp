@@ -2,10 +2,14 @@
 #include "balls.h"
 #include "player.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -44,6 +48,15 @@ void declare(CLI::App& app, Arguments& arguments) {
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
 }
 
+// Where a standard stream is closed or its reader goes away, what is said is lost and the pictures are made: no file
+// of ours gets a stream's number, and no signal ends the work.
+void keepWorkingUnheard() {
+    std::signal(SIGPIPE, SIG_IGN);
+    for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+        if (fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+            if (open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
+}
+
 // To stderr; lost where that is closed or full (fmt::print() would throw).
 void say(const std::string& message) {
     std::fputs((message + "\n").c_str(), stderr);
@@ -64,10 +77,9 @@ int report(const Error& error) {
 
 Expected<std::string> readText(const std::string& path) {
     std::ifstream file(path, std::ios::binary);
-    std::ostringstream text;
-    text << file.rdbuf();
-    if (!file || !text) return fail(ErrorCode::Io, fmt::format("{}: cannot be read.", path));
-    return text.str();
+    const std::string text(std::istreambuf_iterator<char>(file), {});
+    if (!file.is_open() || file.bad()) return fail(ErrorCode::Io, fmt::format("{}: cannot be read.", path));
+    return text;
 }
 
 Expected<void> applySize(const std::string& size, Script& script) {
@@ -132,6 +144,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    keepWorkingUnheard();
     CLI::App app("Plays a script of light switches on a cooked level and writes what one sees, with what it cost.");
     Arguments arguments;
     declare(app, arguments);

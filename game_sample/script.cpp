@@ -59,12 +59,23 @@ std::optional<Number> toNumber(std::string_view word) {
     return value;
 }
 
+// A comment begins at a word's beginning, outside quotes: names may hold a '#'.
+std::string_view withoutComment(std::string_view text) {
+    bool quoted = false, between_words = true;
+    for (size_t i = 0; i < text.size(); ++i) {
+        if (text[i] == '"') quoted = !quoted;
+        if (text[i] == '#' && between_words && !quoted) return text.substr(0, i);
+        between_words = text[i] == ' ' || text[i] == '\t';
+    }
+    return text;
+}
+
 class Parser {
    public:
     explicit Parser(const Pack& pack) : pack_(pack), rehearsal_(pack) { script_.camera = defaultCamera(pack); }
 
     Expected<void> line(std::string_view text) {
-        Words words(text.substr(0, text.find('#')));
+        Words words(withoutComment(text));
         if (words.empty()) return {};
         const std::string_view command = words.next();
         if (auto done = this->command(command, words); !done) return done;

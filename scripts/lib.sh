@@ -6,8 +6,9 @@ packages=(
     libglm-dev libembree-dev libtbb-dev libzstd-dev libxxhash-dev
     libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev libspdlog-dev
     libtet1.5-dev libmeshoptimizer-dev
+    libgtest-dev libgmock-dev  # CMake looks for all that its targets need, whichever is built
 )
-test_packages=(libgtest-dev libgmock-dev clang-format)
+test_packages=(clang-format)
 
 # Installs what is missing of the given Debian packages; says what; does nothing when all is there.
 install_packages() {

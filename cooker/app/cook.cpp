@@ -5,6 +5,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
+#include <pipeline/level_files.h>
 #include <pipeline/write_level.h>
 #include <report/report.h>
 #include <write/pack_writer.h>
@@ -14,6 +15,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <span>
 
 namespace dimmer::cook {
 namespace {
@@ -123,13 +125,33 @@ Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
 
 Expected<void> checkArguments(const CookArguments& a) {
     std::vector<NamedFile> inputs = {{"LEVEL", a.options.level}};
+    addFilesOf("LEVEL", filesNamedBy(a.options.level), inputs);
     const auto shipped = shippedProfiles();
     if (std::ranges::find(shipped, a.options.profile) == shipped.end())
         inputs.push_back({"--profile", a.options.profile});
+    addFilesOf("--profile", filesExtendedBy(a.options.profile), inputs);
     if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" and "-" stand for a file here
     return checkFiles(
         inputs,
         {{"--output", a.options.pack}, {"--json", a.json}, {"--write-level", a.write_level}, {"--report", a.report}});
+}
+
+void sayWarnings(std::span<const std::string> warnings) {
+    for (const std::string& w : warnings) sayMessage("warning: " + w);
+}
+
+// What is written beside the pack.
+Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
+    if (!a.write_level.empty()) {
+        std::vector<std::string>& warnings = result.stats.warnings;
+        const size_t said = warnings.size();
+        auto ok = writeLevel(a.options.level, result.pack, a.write_level, warnings);
+        sayWarnings(std::span(warnings).subspan(said));
+        if (!ok) return ok;
+    }
+    if (!a.report.empty())
+        if (auto ok = writeReport(result, a); !ok) return ok;
+    return a.json.empty() ? Expected<void>() : writeJson(toJson(result), a.json);
 }
 
 int run(const CookArguments& a) {
@@ -147,16 +169,11 @@ int run(const CookArguments& a) {
         options.cache = defaultCache(options.pack);
     std::vector<std::string> warnings;
     auto result = cook(options, *progress, &warnings);
-    for (const std::string& w : warnings) sayMessage("warning: " + w);
+    sayWarnings(result ? result->stats.warnings : warnings);
     if (!result) return reportError(result.error());
-    if (!a.write_level.empty())
-        if (auto ok = writeLevel(a.options.level, result->pack, a.write_level, result->stats.warnings); !ok)
-            return reportError(ok.error());
-    if (!a.report.empty())
-        if (auto ok = writeReport(*result, a); !ok) return reportError(ok.error());
-    for (const std::string& w : result->stats.warnings) sayMessage("warning: " + w);
-    if (!a.json.empty())
-        if (auto ok = writeJson(toJson(*result), a.json); !ok) return reportError(ok.error());
+    if (auto ok = writeOthers(a, *result); !ok)
+        return reportError({ok.error().code, fmt::format("{}\nThe pack has been written: {}", ok.error().message,
+                                                         options.pack.string())});
     if (a.json != "-") printTable(*result, costOf(result->pack));
     if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.suggest_combinations)

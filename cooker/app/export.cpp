@@ -2,6 +2,7 @@
 #include <app/files.h>
 #include <app/terminal_progress.h>
 #include <pipeline/export_pack.h>
+#include <write/pack_writer.h>
 
 #include <fmt/format.h>
 
@@ -16,7 +17,7 @@ struct ExportArguments {
 };
 
 int run(const ExportArguments& a) {
-    const std::filesystem::path pack_name = std::filesystem::path(a.pack).filename();
+    const std::filesystem::path pack_name = behindLinks(a.pack).value_or(a.pack).filename();
     std::vector<NamedFile> outputs = {{"DIR", a.folder, true}};
     std::error_code ignored;
     if (isExportedName(pack_name.string()) && std::filesystem::exists(a.folder / pack_name, ignored))

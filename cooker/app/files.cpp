@@ -62,6 +62,18 @@ Expected<void> checkFolder(const NamedFile& output) {
 
 }  // namespace
 
+void addFilesOf(const std::string& role, const std::vector<fs::path>& paths, std::vector<NamedFile>& files) {
+    for (const fs::path& path : paths) files.push_back({"a file of " + role, path});
+}
+
+std::vector<fs::path> filesIn(const fs::path& folder, bool (*isOne)(std::string_view name)) {
+    std::vector<fs::path> files;
+    std::error_code error, ignored;
+    for (fs::directory_iterator entry(folder, error); !error && entry != fs::end(entry); entry.increment(error))
+        if (isOne(entry->path().filename().native()) && entry->is_regular_file(ignored)) files.push_back(entry->path());
+    return files;
+}
+
 Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
     for (size_t i = 0; i < outputs.size(); ++i) {
         if (!isFile(outputs[i])) continue;

@@ -26,24 +26,6 @@ bool isDoor(const PackData& d, uint32_t element) {
     return d.elements[element].kind == ElementKind::Door;
 }
 
-// {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that shape is left out, and
-// what nests deeper is not even built.
-nlohmann::ordered_json settingsOf(const PackData& d) {
-    using Json = nlohmann::ordered_json;
-    const auto shallow = [](int depth, Json::parse_event_t event, const Json&) {
-        return depth < 2 || (event != Json::parse_event_t::object_start && event != Json::parse_event_t::array_start);
-    };
-    const Json all = Json::parse(d.settings_json, shallow, false);
-    Json settings = Json::object();
-    if (!all.is_object()) return settings;
-    for (const auto& [key, setting] : all.items()) {
-        if (!setting.is_object() || !setting.contains("value") || !setting.contains("from")) continue;
-        const auto &value = setting["value"], &from = setting["from"];
-        if (value.is_primitive() && from.is_string()) settings[key] = {{"value", value}, {"from", from}};
-    }
-    return settings;
-}
-
 // The budgets that the pack was cooked for; none where it does not say.
 Profile budgetsOf(const PackData& d) {
     const auto settings = readSettings(d.settings_json);
@@ -130,11 +112,14 @@ void printGrid(const PackData& d, const PackCost& cost) {
     }
 }
 
+uint64_t probesOf(const PackData& d, size_t contribution) {
+    return d.probes.record_counts.empty() ? 0 : d.probes.record_counts[contribution];
+}
+
 // At texels and probes.
 uint64_t recordBytes(const PackData& d, size_t contribution) {
-    const auto& probes = d.probes.record_counts;
     return d.contributions[contribution].receivers * sizeof(TexelRecord) +
-           (probes.empty() ? 0 : probes[contribution] * sizeof(ProbeRecord));
+           probesOf(d, contribution) * sizeof(ProbeRecord);
 }
 
 nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
@@ -168,6 +153,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                                       {"doors_open", elementNames(d, c.doors_open)},
                                       {"doors_closed", elementNames(d, c.doors_closed)},
                                       {"receivers", c.receivers},
+                                      {"probes", probesOf(d, k)},
                                       {"bytes", recordBytes(d, k)},
                                       {"energy_dropped", c.energy_dropped}});
     }
@@ -183,7 +169,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     j["mixed_batches"] = 0;
     j["overlap_histogram"] = cost.overlap_histogram;
     j["budgets"] = budgetsJson(budgetsOf(d));
-    j["settings"] = settingsOf(d);
+    j["settings"] = listedSettings(d.settings_json);
     return j;
 }
 
@@ -196,10 +182,11 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
         d.batches.empty() ? 0.0 : static_cast<double>(d.addresses.size()) / static_cast<double>(d.batches.size()));
     printGrid(d, cost);
     printModels(d, cost);
-    fmt::print("\n{:<26} {:>12} {:>12} {:>16}\n", "contribution", "receivers", "bytes", "energy dropped");
+    fmt::print("\n{:<40} {:>12} {:>12} {:>12} {:>16}\n", "contribution", "texels", "probes", "bytes", "energy dropped");
     for (size_t k = 0; k < d.contributions.size(); ++k)
-        fmt::print("{:<26} {:>12} {:>12} {:>14.2f} %\n", lightName(d, d.contributions[k]), d.contributions[k].receivers,
-                   humanBytes(recordBytes(d, k)), 100 * static_cast<double>(d.contributions[k].energy_dropped));
+        fmt::print("{:<40} {:>12} {:>12} {:>12} {:>14.2f} %\n", describe(d, d.contributions[k]),
+                   d.contributions[k].receivers, probesOf(d, k), humanBytes(recordBytes(d, k)),
+                   100 * static_cast<double>(d.contributions[k].energy_dropped));
     fmt::print("\n{:<26} {:>12}\n", "overlap", "texels");
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n)
         fmt::print("{:<26} {:>12}\n", n, cost.overlap_histogram[n]);
@@ -207,7 +194,7 @@ void printTable(const PackData& d, const PackCost& cost, uint64_t file_bytes) {
 
 void printSettings(const PackData& d) {
     fmt::print("{:<32} {:<16} {}\n", "setting", "value", "from");
-    const auto settings = settingsOf(d);
+    const auto settings = listedSettings(d.settings_json);
     for (const auto& [key, setting] : settings.items())
         fmt::print("{:<32} {:<16} {}\n", key, setting["value"].dump(), setting["from"].get<std::string>());
 }

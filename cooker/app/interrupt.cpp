@@ -13,7 +13,7 @@ void endCleanlyOnInterrupt() {
     sigset_t signals;
     sigemptyset(&signals);
     bool any = false;
-    for (const int signal : {SIGINT, SIGTERM}) {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         struct sigaction action {};
         if (sigaction(signal, nullptr, &action) != 0 || action.sa_handler == SIG_IGN) continue;
         sigaddset(&signals, signal);

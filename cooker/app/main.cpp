@@ -4,8 +4,11 @@
 #include <update/state_text.h>
 
 #include <fmt/format.h>
+#include <poll.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <exception>
 #include <iostream>
@@ -14,12 +17,19 @@ namespace {
 
 using dimmer::cook::sayMessage;
 
-// Output that a full disk or a closed pipe swallowed is no output: the caller must not take it for done.
+// Of the pipe that stdout is, as `head` goes when it has enough.
+bool readerHasGone() {
+    pollfd out{.fd = STDOUT_FILENO, .events = 0, .revents = 0};
+    return poll(&out, 1, 0) == 1 && (out.revents & POLLERR) != 0;
+}
+
+// Output that a full disk or a closed pipe swallowed is no output: the caller must not take it for done. A reader that
+// has gone does not want to be told.
 int checkOutput(int exit_code) {
     using namespace dimmer::cook;
     const bool written = std::cout.flush() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
     if (written || exit_code != exit_done) return exit_code;
-    sayMessage("error: the output could not be written");
+    if (!readerHasGone()) sayMessage("error: the output could not be written");
     return exit_bad_input;
 }
 
@@ -53,6 +63,7 @@ int endOfParsing(const CLI::App& app, const CLI::ParseError& error) {
 int main(int argc, char** argv) {
     using namespace dimmer::cook;
     keepClosedStreamsClosed();
+    std::signal(SIGPIPE, SIG_IGN);  // writing shows what is lost; of stderr that is no reason to end the work
     CLI::App app{
         "Dimmer: baked global illumination that you can switch.\nCooks a glTF level into a pack, and looks into "
         "packs."};

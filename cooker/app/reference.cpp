@@ -1,6 +1,7 @@
 #include <app/command.h>
 #include <app/files.h>
 #include <app/terminal_progress.h>
+#include <pipeline/level_files.h>
 #include <pipeline/reference_state.h>
 #include <pipeline/sample_points.h>
 #include <write/pack_writer.h>
@@ -33,8 +34,9 @@ Expected<void> writeValues(const std::string& file, std::span<const QueryPoint> 
 }
 
 int run(const ReferenceArguments& a) {
-    if (auto ok = checkFiles({{"LEVEL", a.level}, {"--points", a.points}}, {{"--output", a.output}}); !ok)
-        return reportError(ok.error());
+    std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"--points", a.points}};
+    addFilesOf("LEVEL", filesNamedBy(a.level), inputs);
+    if (auto ok = checkFiles(inputs, {{"--output", a.output}}); !ok) return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto state = readReferenceState(*scene, a.state);

@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/files.h>
+#include <pipeline/heat_map.h>
 #include <report/report.h>
 #include <write/pack_writer.h>
 
@@ -66,7 +67,8 @@ Expected<void> addVerify(const std::string& file, ReportInput& input) {
 }
 
 int run(const ReportArguments& a) {
-    const std::vector<NamedFile> inputs = {{"PACK", a.pack}, {"--cook", a.cook_json}, {"--verify", a.verify_json}};
+    std::vector<NamedFile> inputs = {{"PACK", a.pack}, {"--cook", a.cook_json}, {"--verify", a.verify_json}};
+    addFilesOf("--heatmap", filesIn(a.heat_maps, isHeatMapName), inputs);
     if (auto ok = checkFiles(inputs, {{"--output", a.output}}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());

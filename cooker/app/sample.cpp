@@ -27,11 +27,6 @@ Expected<LightPages> pagesOnCpu(const Pack& pack, const std::string& state) {
                       {runtime.probes().begin(), runtime.probes().end()}};
 }
 
-std::vector<uint32_t> cookedProbes(const Pack& pack) {
-    const CpuRuntime runtime(pack);
-    return {runtime.probes().begin(), runtime.probes().end()};
-}
-
 Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
     auto device = HeadlessDevice::create({});
     if (!device) return std::unexpected(device.error());
@@ -41,8 +36,6 @@ Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
     if (auto ok = runtime->submit(); !ok) return std::unexpected(ok.error());
     auto pages = runtime->readPages();
     if (!pages) return std::unexpected(pages.error());
-    // Without dynamic light on any probe the runtime has none of its own: they are as cooked.
-    if (pages->probes.empty()) pages->probes = cookedProbes(pack);
     return LightPages{std::move(pages->irradiance), std::move(pages->direction), std::move(pages->probes)};
 }
 

@@ -3,6 +3,7 @@
 #include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/heat_map.h>
+#include <pipeline/level_files.h>
 #include <pipeline/profile.h>
 #include <pipeline/verify.h>
 #include <write/pack_writer.h>
@@ -155,10 +156,11 @@ Expected<void> writeCsv(const VerifyReport& report, const std::string& file) {
 }
 
 int run(VerifyArguments a) {
-    const std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"PACK", a.pack}};
-    const NamedFile heatmap = {"--heatmap", a.heatmap, true};
-    if (auto ok = checkFiles(inputs, {{"--json", a.json}, {"--csv", a.csv}, heatmap}); !ok)
-        return reportError(ok.error());
+    std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"PACK", a.pack}};
+    addFilesOf("LEVEL", filesNamedBy(a.level), inputs);
+    std::vector<NamedFile> outputs = {{"--json", a.json}, {"--csv", a.csv}, {"--heatmap", a.heatmap, true}};
+    addFilesOf("--heatmap", filesIn(a.heatmap, isHeatMapName), outputs);
+    if (auto ok = checkFiles(inputs, outputs); !ok) return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto pack = Pack::open(a.pack);

@@ -30,6 +30,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
         std::vector<ReceiverLight> row;
         std::vector<uint32_t> terms, of_group;
         RowEnds own_ends;
+        if (ends) own_ends.kept_max = ends->keptMax();
         std::vector<RowEnds> all_ends;
         uint64_t traced = 0;
         for (size_t i = begin; i < end; ++i) {
@@ -106,8 +107,7 @@ FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
         baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress, links);
         baked.light =
             gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays, rays ? &rays->gather : nullptr);
-        baked.local_light =
-            bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays, baked.warnings);
+        baked.local_light = bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays);
     }
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
@@ -148,6 +148,7 @@ class Bake {
         if (settings_.grid.probes_max > 0) findGrid();
         if (std::ranges::count(turns_.follow, 1) > 0) followGroups();
         addGroups(found_, paths_, baked_);
+        warnOfLocalGrids();
         if (sites_) makeGrid();
         for (const auto* probes : {&baked_.grid.light, &baked_.local_light})
             for (size_t i = 0; i < probes->rows(); ++i)
@@ -244,6 +245,13 @@ class Bake {
         if (!grid) return warnOfNoGrid(grid.error());
         baked_.grid = std::move(*grid);
         if (store_) store_->keepGrid(baked_.grid);
+    }
+
+    void warnOfLocalGrids() {
+        if (std::ranges::all_of(rays_.scene().models, &SceneModel::moves)) return;
+        auto found = gatherer_ ? warningsOfLocalGrids(rays_, gatherer_->models())
+                               : warningsOfLocalGrids(rays_, ModelReceivers(rays_));
+        std::ranges::move(found, std::back_inserter(baked_.warnings));
     }
 
     void warnOfNoGrid(const Error& error) { baked_.warnings.push_back("no global grid: " + error.message); }

@@ -25,7 +25,7 @@ struct GridSettings {
 };
 
 struct BakeSettings {
-    uint32_t series_rays = 32;     // per texel, for the bounces; kept as 4-byte links while the series runs
+    uint32_t series_rays = 32;     // per texel, for the bounces; kept as links of 2 to 3 bytes while the series runs
     uint32_t final_rays = 128;     // per texel and term at most, for what is stored
     uint32_t emitter_samples = 8;  // per series_rays or round of final rays, towards each light group's emitters
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
@@ -162,9 +162,9 @@ class GroupStore {
 
 // The series expansion of the rendering equation over the lightmap itself: direct light once, then links between
 // receivers traced once and followed bounce after bounce, then one gather of many rays that is kept.
-// Deterministic for any number of threads, and whatever a store already has. Memory: 4 bytes * series_rays per texel,
-// plus what is active. Models whose transfers were not found (models/self_visibility.h) get what was gathered at their
-// probes.
+// Deterministic for any number of threads, and whatever a store already has. Memory: 2 to 3 bytes * series_rays per
+// texel, plus what is active. Models whose transfers were not found (models/self_visibility.h) get what was gathered at
+// their probes.
 Baked bake(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, const BakeSettings& settings,
            Progress& progress, GroupStore* store = nullptr);
 

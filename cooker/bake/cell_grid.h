@@ -12,7 +12,7 @@ namespace dimmer::cook {
 class CellGrid {
    public:
     CellGrid() = default;
-    CellGrid(glm::vec3 min_m, glm::vec3 max_m) : origin_(min_m) {
+    CellGrid(glm::vec3 min_m, glm::vec3 max_m, float cell_min_m) : origin_(min_m) {
         const glm::vec3 extent = max_m - min_m;
         cell_m_ = std::max(cell_min_m, std::max(extent.x, std::max(extent.y, extent.z)) / cells_per_axis_max);
         size_ = glm::uvec3(glm::floor(extent / cell_m_)) + 1u;
@@ -49,11 +49,10 @@ class CellGrid {
 
     // Rays are followed in steps of this share of a cell: short enough not to cut more than corners.
     static constexpr float step_share = 0.5f;
-    static constexpr float cell_min_m = 2;
     static constexpr float cells_per_axis_max = 48;
 
     glm::vec3 origin_{0};
-    float cell_m_ = cell_min_m;
+    float cell_m_ = 1;
     glm::uvec3 size_{1};
 };
 

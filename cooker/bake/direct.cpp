@@ -10,14 +10,15 @@
 namespace dimmer::cook {
 namespace {
 
-// A far light's shadow changes little across a texel's points: one ray, from a point that differs between lights.
+// What a far light's shadow changes across a texel is little beside what the texel's neighbours get, and only
+// reflected: one ray, from a point that differs between lights.
 constexpr float near_m = 10;
 
 }  // namespace
 
 template <class Light>
 uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const GatherFrom& from,
-                     TermAccumulator<Light>& reflected, TermAccumulator<Light>& stored) {
+                     TermAccumulator<Light>& reflected, TermAccumulator<Light>& stored, uint32_t points_max) {
     const RayScene& rays = gatherer.rays();
     const DoorPaths& paths = gatherer.paths();
     const auto points = static_cast<uint32_t>(from.points.size());
@@ -49,8 +50,10 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
     grid.forEach(place, [&](uint32_t l) {
         const PunctualLight& light = lights[l];
         const uint32_t first = hash(grid.identity(l), from.id) % points;
-        const bool near = light.type == LightType::Directional || glm::distance(light.position_m, place) < near_m;
-        const uint32_t used = near ? points : 1;
+        // Shadows that are stored are seen, and have edges at any distance.
+        const bool all = light.type == LightType::Directional || light.bake == BakeMode::Full ||
+                         glm::distance(light.position_m, place) < near_m;
+        const uint32_t used = all ? std::min(points, points_max) : 1;
         for (uint32_t i = 0; i < used; ++i)
             addLight(light, from.points[(first + i) % points], 1 / static_cast<float>(used));
     });
@@ -58,8 +61,8 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
 }
 
 template uint64_t directLight(const Gatherer&, const LightGrid&, const GatherFrom&, TermAccumulator<Gathered>&,
-                              TermAccumulator<Gathered>&);
+                              TermAccumulator<Gathered>&, uint32_t);
 template uint64_t directLight(const Gatherer&, const LightGrid&, const GatherFrom&, TermAccumulator<ProbeLight>&,
-                              TermAccumulator<ProbeLight>&);
+                              TermAccumulator<ProbeLight>&, uint32_t);
 
 }  // namespace dimmer::cook

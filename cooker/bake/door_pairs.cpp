@@ -135,9 +135,9 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
     if (pairs.empty()) return flux;
     for (const DoorIndices& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
     const DoorPaths paths(named, doorsInSight(gatherer.rays()));
-    const Gatherer keeping_pairs(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), gatherer.emitters(), paths);
-    const Series measured =
-        expandSeries(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
+    const Gatherer keeping_pairs(gatherer, paths);
+    const std::vector<double> measured =
+        termFlux(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
 
     for (DoorFlux& f : flux) {
         f.alone.resize(named.doors.size());
@@ -146,7 +146,7 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
     for (uint32_t t = 0; t < paths.termCount(); ++t) {
         const Term& term = paths.terms()[t];
         const auto doors = doorsOf(term);
-        const double energy = measured.reports[t].energy;
+        const double energy = measured[t];
         DoorFlux& f = flux[term.group];
         for (const uint32_t door : doors)
             if (term.doors_open.empty() || term.doors_open == std::vector{door}) f.alone[door] += energy;

@@ -13,8 +13,8 @@ namespace dimmer::cook {
 std::vector<DoorIndices> doorsInSight(const RayScene& rays);
 
 // Per light group; of groups that are not asked for, nothing. `series` is the bake's own. Measured by another of few
-// rays that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing. `links`: as
-// expandSeries() has them.
+// rays (termFlux) that keeps the pairs which some surface sees together; where no pair is seen, it costs nothing.
+// `links`: as expandSeries() has them.
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
                                std::span<const uint8_t> groups, Progress& progress, RayEnds* links = nullptr);
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -18,11 +19,15 @@ constexpr float coverage_min = 1e-5f;
 // Every emitter sends out some of its group's rays, up to so many in all.
 constexpr uint32_t rays_per_emitter = 128, probe_rays_max = 65536;
 constexpr float lift_m = 1e-3f;  // off the emitter
+// The house's receivers ask 3.6 of 16 groups, of which 1.1 shine there, and 5.8 with cells of 2 m.
+constexpr float emitter_cell_min_m = 1;
 
-// Uniform on a triangle: fold the unit square.
-glm::vec3 pointOn(const Emitter& e, glm::vec2 u) {
-    const float root = std::sqrt(u.x);
-    return e.corner + e.edge1 * (root * (1 - u.y)) + e.edge2 * (root * u.y);
+// Uniform on a triangle: the unit square, folded. As Hit::u and v.
+glm::vec2 onTriangle(glm::vec2 u) {
+    return std::sqrt(u.x) * glm::vec2(1 - u.y, u.y);
+}
+glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
+    return e.corner + e.edge1 * at.x + e.edge2 * at.y;
 }
 
 }  // namespace
@@ -56,7 +61,7 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     if (emitters_.empty()) return;
     for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
 
-    grid_ = {rays.boundsMin(), rays.boundsMax()};
+    grid_ = {rays.boundsMin(), rays.boundsMax(), emitter_cell_min_m};
     cells_.resize(grid_.count());
     std::vector<std::span<const Emitter>> groups;
     for (size_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
@@ -95,7 +100,8 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
         orthonormalBasis(normal, t, b);
         const glm::vec3 d = cosineDirection(sequence2d(own, hash(seed, 2 * e.triangle)));
         const glm::vec3 world = t * d.x + b * d.y + normal * d.z;
-        const glm::vec3 from = pointOn(e, sequence2d(own, hash(seed, 2 * e.triangle + 1))) + normal * lift_m;
+        const glm::vec3 from =
+            pointOn(e, onTriangle(sequence2d(own, hash(seed, 2 * e.triangle + 1)))) + normal * lift_m;
         // Through doors: what is behind them is lit once they open.
         const auto hit = rays.nearest(from, world, far_m, hash(seed, i), Surfaces::Walls);
         grid_.mark(from, world, hit ? hit->distance_m : far_m, spread, marks);
@@ -112,21 +118,19 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
         const size_t first = cell.choices.size();
         float sum = 0, brightest = 0;
         size_t end = begin;
-        for (; end < emitters_.size() && emitters_[end].group == group; ++end) {
-            const Emitter& e = emitters_[end];
+        while (end < emitters_.size() && emitters_[end].group == group) ++end;
+        const size_t range_begin = std::exchange(begin, end);
+        if (!lit[g][index]) continue;
+        for (size_t i = range_begin; i < end; ++i) {
+            const Emitter& e = emitters_[i];
             const glm::vec3 to_centre = centre - (e.corner + (e.edge1 + e.edge2) / 3.0f);
             brightest = std::max(brightest, luminance(e.radiance_cd_m2));
             if (!e.double_sided && glm::dot(centre - e.corner, e.normal) < -radius_m) continue;
             const float near2 = radius_m * radius_m + e.area_m2;
             const float weight =
                 luminance(e.radiance_cd_m2) * e.area_m2 / std::max(glm::dot(to_centre, to_centre), near2);
-            cell.choices.push_back({static_cast<uint32_t>(end), weight, 0});
+            cell.choices.push_back({static_cast<uint32_t>(i), weight, 0});
             sum += weight;
-        }
-        begin = end;
-        if (!lit[g][index]) {
-            cell.choices.resize(first);
-            continue;
         }
         auto keep = [&](const Choice& c) { return c.probability >= choice_share_min * sum; };
         const auto tail =
@@ -153,13 +157,13 @@ std::span<const EmitterSampler::GroupRange> EmitterSampler::groups(uint32_t cell
     return {ranges_.data() + first_range_[cell], first_range_[cell + 1] - first_range_[cell]};
 }
 
-EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, float choice,
-                                     glm::vec2 on_triangle) const {
+EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 u) const {
     const auto begin = choices_.begin() + range.first, end = begin + range.count;
     auto it = std::upper_bound(begin, end, choice, [](float v, const Choice& c) { return v < c.cumulative; });
     if (it == end) --it;
     const Emitter& e = emitters_[it->emitter];
-    const glm::vec3 to_target = pointOn(e, on_triangle) - point;
+    const glm::vec2 at = onTriangle(u);
+    const glm::vec3 to_target = pointOn(e, at) - point;
     const float distance2 = glm::dot(to_target, to_target);
     if (!(distance2 > 0)) return {};
     const float distance = std::sqrt(distance2);
@@ -167,7 +171,8 @@ EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, f
     float cos_emitter = -glm::dot(direction, e.normal);
     if (e.double_sided) cos_emitter = std::abs(cos_emitter);
     if (!(cos_emitter > 0)) return {};
-    return {direction, distance, e.radiance_cd_m2, e.triangle, it->probability * distance2 / (e.area_m2 * cos_emitter)};
+    const float pdf = it->probability * distance2 / (e.area_m2 * cos_emitter);
+    return {direction, distance, e.radiance_cd_m2, e.triangle, at, pdf};
 }
 
 const Emitter* EmitterSampler::emitterOf(uint32_t triangle) const {

@@ -30,7 +30,8 @@ struct EmitterSample {
     float distance_m;
     glm::vec3 radiance_cd_m2;
     uint32_t triangle;
-    float pdf;  // per steradian; 0: nothing to see
+    glm::vec2 at;  // on it, as Hit::u and v
+    float pdf;     // per steradian; 0: nothing to see
 };
 
 // Rays that each light group's emitters send out to find the cells that they shine into.
@@ -52,7 +53,8 @@ class EmitterSampler {
     uint32_t cellAt(glm::vec3 point) const { return grid_.at(point); }
     std::span<const GroupRange> groups(uint32_t cell) const;
 
-    EmitterSample sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 on_triangle) const;
+    // `choice`, `u`: uniform in 0..1: which emitter, and where on it.
+    EmitterSample sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 u) const;
 
     // The emitter of a level triangle, or null.
     const Emitter* emitterOf(uint32_t triangle) const;

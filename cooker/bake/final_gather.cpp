@@ -109,7 +109,7 @@ void FinalGather<Light>::want(uint32_t term, bool wanted) {
 template <class Light>
 RowEnds* FinalGather<Light>::endsOfRound(RowEnds* row, uint32_t round) {
     const size_t end = (size_t{round} + 1) * rays_per_round;
-    if (!row || end > std::max<size_t>(row->ends.size(), kept_rays_max)) return nullptr;
+    if (!row || end > std::max<size_t>(row->ends.size(), row->kept_max)) return nullptr;
     if (row->ends.size() < end) row->ends.resize(end, RayEnd::unknown);
     return row;
 }

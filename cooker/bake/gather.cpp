@@ -163,13 +163,13 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
 
 uint32_t Gatherer::guideOf(uint32_t term) const {
     const uint32_t door = paths_.onlyDoor(term);
-    return door == no_door ? no_guide : guides_.guideOf(door, paths_.terms()[term].group);
+    return door == no_door ? no_guide : guides_->guideOf(door, paths_.terms()[term].group);
 }
 
 DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
-    DoorAim aim{guide, guides_.ownGroup(guide), {}};
+    DoorAim aim{guide, guides_->ownGroup(guide), {}};
     for (const SamplePoint& p : from.points)
-        aim.from_point.emplace_back(guides_.boxes(guide), p.position_m,
+        aim.from_point.emplace_back(guides_->boxes(guide), p.position_m,
                                     p.face == no_face ? glm::vec3(0) : frameOf(p).normal);
     return aim;
 }
@@ -179,7 +179,7 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
                            TermAccumulator<Light>& sum, const DoorAims& aims, size_t a) const {
     const DoorAim& aim = aims.all[a];
     // Seeded by the guide alone: what else is aimed at does not change its noise.
-    const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), guides_.identity(aim.guide));
+    const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), guides_->identity(aim.guide));
     for (uint32_t i = 0; i < aimed_rays; ++i) {
         // The rays of all rounds are one sequence.
         const uint32_t index = options.first_ray * aimed_rays / options.rays + i;
@@ -325,8 +325,8 @@ uint32_t Gatherer::modelReceiverAt(const Hit& hit, uint32_t chance) const {
     const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
     if (triangle.model == no_model) return no_index;
     if (hit.back && !rays_.scene().materials[triangle.material].double_sided) return no_index;
-    const uint32_t found = models_.pick(triangle.model, rays_.pointOn(hit.triangle, hit.u, hit.v),
-                                        hit.back ? -triangle.normal : triangle.normal, chance);
+    const uint32_t found = models_->pick(triangle.model, rays_.pointOn(hit.triangle, hit.u, hit.v),
+                                         hit.back ? -triangle.normal : triangle.normal, chance);
     return found == no_index ? no_index : static_cast<uint32_t>(texels_.size()) + found;
 }
 
@@ -343,7 +343,7 @@ uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) co
             ray.sum[term].add(e->radiance_cd_m2 * (ray.alone(path) * by_hit / (by_hit + by_area)), ray.weights);
     }
     uint32_t found = receiverOf(unwrap_, texels_, hit);
-    if (found == no_index && !models_.empty())
+    if (found == no_index && !models_->empty())
         found = modelReceiverAt(hit, hash(hash(ray.options.seed, ray.from.id), ray.options.first_ray + ray.i));
     if (found == no_index) return no_index;
     if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
@@ -352,21 +352,25 @@ uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) co
     return found;
 }
 
+// The innermost work of a bake: once for every ray and every term at its end.
 template <class Light>
 void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path) const {
-    const bool as_it_is = path == free_path && ray.from.condition == no_condition, any_aim = !ray.aims.all.empty();
+    const bool as_it_is = path == free_path && ray.from.condition == no_condition;
     const float alone = ray.alone(path);
     const uint32_t only = ray.aim != 0 ? ray.aims.all[ray.aim - 1].group : shared_guide;
+    const uint16_t* const aim_of = ray.aims.all.empty() ? nullptr : ray.aims.of_term.data();
+    TermAccumulator<Light>& sum = ray.sum;
     for (const TermLight& light : ray.outgoing->row(receiver)) {
         if (only != shared_guide && paths_.group(light.term) != only) continue;
         const uint32_t found = as_it_is ? light.term : paths_.moved(light.term, path, ray.from.condition);
         if (found == no_term) continue;
-        const uint32_t term = ray.sum.into(found);
+        const uint32_t term = sum.into(found);
         if (term == no_term) continue;
-        if (any_aim)
-            add(ray, path, term, light.value, ray.aims.of_term[term]);
-        else
-            ray.sum[term].add(light.value * alone, ray.weights);
+        const uint32_t aim = aim_of ? aim_of[term] : 0;
+        if (aim != 0)
+            add(ray, path, term, light.value, aim);
+        else if (ray.aim == 0)
+            sum[term].add(light.value * alone, ray.weights);
     }
 }
 
@@ -429,17 +433,20 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             const glm::vec3 d = toTangent(origin, s.direction);
             if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
             if (from.ignored != no_model && rays_.triangles()[s.triangle].model == from.ignored) continue;
+            const float alpha = rays_.alphaAt(s.triangle, s.at.x, s.at.y);  // rays that hit it pass through the rest
+            if (!(alpha > 0)) continue;
             const float weight = Light::Intake::weight(d), by_area = samples * s.pdf;
             const uint32_t target = rays_.triangles()[s.triangle].condition;
-            forEachWay(
-                rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
-                s.distance_m * shadow_end_share, [&](float passed, uint32_t way) {
-                    const uint32_t path = onto(way, from.condition, target);
-                    const uint32_t term = wantedOf(range.group, path, sum);
-                    const float by_hit = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
-                    if (term != no_term)
-                        sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_area + by_hit)), Light::weightsOf(d));
-                });
+            forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
+                       s.distance_m * shadow_end_share, [&](float passed, uint32_t way) {
+                           const uint32_t path = onto(way, from.condition, target);
+                           const uint32_t term = wantedOf(range.group, path, sum);
+                           const float by_hit =
+                               static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
+                           if (term != no_term)
+                               sum[term].add(s.radiance_cd_m2 * (alpha * passed * weight / (by_area + by_hit)),
+                                             Light::weightsOf(d));
+                       });
         }
     }
 }

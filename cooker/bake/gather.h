@@ -16,6 +16,7 @@
 #include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <span>
@@ -166,8 +167,18 @@ class Gatherer {
           emitters_(emitters),
           paths_(paths),
           sky_(rays.scene()),
-          guides_(rays),
-          models_(rays) {}
+          guides_(std::make_shared<const DoorGuides>(rays)),
+          models_(std::make_shared<const ModelReceivers>(rays)) {}
+    // The same over other paths.
+    Gatherer(const Gatherer& other, const DoorPaths& paths)
+        : rays_(other.rays_),
+          unwrap_(other.unwrap_),
+          texels_(other.texels_),
+          emitters_(other.emitters_),
+          paths_(paths),
+          sky_(other.sky_),
+          guides_(other.guides_),
+          models_(other.models_) {}
 
     // Adds to `sum` what comes straight from emitters and the sky, and, when given, the radiance `outgoing` of the
     // receivers that rays hit; of both, what `sum` wants. `links`, when given, takes where the rays ended.
@@ -182,18 +193,18 @@ class Gatherer {
     uint32_t guideOf(uint32_t term) const;
 
     // Texels, then the receivers of models.
-    size_t receiverCount() const { return texels_.size() + models_.size(); }
+    size_t receiverCount() const { return texels_.size() + models_->size(); }
     float areaM2(size_t receiver) const {
-        return receiver < texels_.size() ? texels_.area_m2[receiver] : models_.areaM2(receiver - texels_.size());
+        return receiver < texels_.size() ? texels_.area_m2[receiver] : models_->areaM2(receiver - texels_.size());
     }
     glm::vec3 reflectance(size_t receiver) const {
         return receiver < texels_.size() ? texels_.reflectance[receiver]
-                                         : models_.reflectance(receiver - texels_.size());
+                                         : models_->reflectance(receiver - texels_.size());
     }
     GatherFrom at(size_t receiver) const {
         if (receiver >= texels_.size()) {
             const size_t i = receiver - texels_.size();
-            return {models_.points(i), static_cast<uint32_t>(receiver), no_condition, models_.model(i), true};
+            return {models_->points(i), static_cast<uint32_t>(receiver), no_condition, models_->model(i), true};
         }
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
                 static_cast<uint32_t>(receiver),
@@ -220,7 +231,7 @@ class Gatherer {
     const Texels& texels() const { return texels_; }
     const DoorPaths& paths() const { return paths_; }
     const EmitterSampler& emitters() const { return emitters_; }
-    const ModelReceivers& models() const { return models_; }
+    const ModelReceivers& models() const { return *models_; }
 
    private:
     struct AimShares;
@@ -262,8 +273,9 @@ class Gatherer {
     const EmitterSampler& emitters_;
     const DoorPaths& paths_;
     SkySampler sky_;
-    DoorGuides guides_;
-    ModelReceivers models_;
+    // Of the level alone, and shared by gatherers of it: both trace rays of their own.
+    std::shared_ptr<const DoorGuides> guides_;
+    std::shared_ptr<const ModelReceivers> models_;
 };
 
 }  // namespace dimmer::cook

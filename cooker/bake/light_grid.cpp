@@ -12,6 +12,8 @@
 namespace dimmer::cook {
 namespace {
 
+// With smaller cells light is lost through openings between a lamp's rays.
+constexpr float cell_min_m = 2;
 // Lights further outside of the level are no lamps of its: their rays would miss it.
 constexpr float margin_m = 20;
 
@@ -51,7 +53,7 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
         (unlisted ? everywhere_ : sought).push_back(l);
     }
     if (sought.empty()) return;
-    grid_ = {rays.boundsMin(), rays.boundsMax()};
+    grid_ = {rays.boundsMin(), rays.boundsMax(), cell_min_m};
 
     std::vector<std::vector<uint32_t>> reached(sought.size());
     tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, sought[i]); });
@@ -68,7 +70,9 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
 std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t index) const {
     const PunctualLight& light = rays.scene().lights[index];
     const float cos_least = light.type == LightType::Spot ? light.cone_outer_cos : -1;
-    const float far_m = light.range_m.value_or(glm::length(rays.boundsMax() - rays.boundsMin()) + 2 * margin_m);
+    // No further than the level goes, whatever range a file states.
+    const float across_m = glm::length(rays.boundsMax() - rays.boundsMin()) + 2 * margin_m;
+    const float far_m = std::min(light.range_m.value_or(across_m), across_m);
     // The way to the neighbouring rays, per metre: no direction is further from its nearest ray, so that in the open
     // nothing is missed however far.
     const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));

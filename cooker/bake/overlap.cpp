@@ -44,24 +44,24 @@ Sparse<Entry> limited(const Sparse<Entry>& light, uint32_t most) {
     });
 }
 
-// Per term, luminance over all texels. In the order of receivers, so that it is always the same.
-std::vector<double> lightOfTerms(const Sparse<ReceiverLight>& light, size_t terms) {
+// Per term, the luminous flux that arrives at all texels, lm. In the order of receivers, so that it is always the same.
+std::vector<double> fluxOfTerms(const Sparse<ReceiverLight>& light, std::span<const float> area_m2, size_t terms) {
     std::vector<double> sums(terms, 0);
     for (size_t i = 0; i < light.rows(); ++i)
         for (const ReceiverLight& l : light.row(i))
-            sums[l.term] += static_cast<double>(luminance(l.light.irradiance()));
+            sums[l.term] += static_cast<double>(area_m2[i] * luminance(l.light.irradiance()));
     return sums;
 }
 
 }  // namespace
 
-void limitOverlap(Baked& baked, uint32_t most) {
+void limitOverlap(Baked& baked, std::span<const float> area_m2, uint32_t most) {
     if (most == 0) return;
-    const auto before = lightOfTerms(baked.light, baked.terms.size());
+    const auto before = fluxOfTerms(baked.light, area_m2, baked.terms.size());
     baked.light = limited(baked.light, most);
     if (baked.grid.light.rows() > 0) baked.grid.light = limited(baked.grid.light, most);
     if (baked.local_light.rows() > 0) baked.local_light = limited(baked.local_light, most);
-    const auto after = lightOfTerms(baked.light, baked.terms.size());
+    const auto after = fluxOfTerms(baked.light, area_m2, baked.terms.size());
     for (size_t t = 0; t < baked.reports.size(); ++t)
         if (before[t] > 0)
             baked.reports[t].energy_dropped += (1 - baked.reports[t].energy_dropped) * (1 - after[t] / before[t]);

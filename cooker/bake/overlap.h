@@ -6,7 +6,8 @@
 namespace dimmer::cook {
 
 // Leaves every texel and probe with its always-on light and the `most` contributions that have most light there, by
-// luminance at weight 1; 0: as many as there are. What goes of a term's light on texels is added to its report.
-void limitOverlap(Baked& baked, uint32_t most);
+// luminance at weight 1; 0: as many as there are. What goes of a term's light on texels, of these areas, is added to
+// its report.
+void limitOverlap(Baked& baked, std::span<const float> area_m2, uint32_t most);
 
 }  // namespace dimmer::cook

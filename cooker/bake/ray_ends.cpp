@@ -26,6 +26,11 @@ RayEnds::RayEnds(size_t rows, uint32_t receivers, uint32_t paths)
       bits_(static_cast<uint32_t>(std::bit_width(std::max(receivers + RayEnd::kinds, 2 * paths) - 1))),
       blocks_(blockCount(rows)) {}
 
+uint32_t RayEnds::keptMax() const {
+    const size_t bits_max = 8 * kept_bytes_max;
+    return static_cast<uint32_t>(std::min<size_t>(kept_rays_max, bits_max / std::max<size_t>(1, rows_ * bits_)));
+}
+
 void RayEnds::get(size_t row, RowEnds& out) const {
     out.clear();
     const Block& block = blocks_[row / rows_per_block];

@@ -28,9 +28,10 @@ struct PathEnd {
 
 // The ends of one row's rays, in their order.
 struct RowEnds {
-    std::vector<uint32_t> ends;    // per ray
-    std::vector<PathEnd> through;  // of all rays that are RayEnd::through, one after another
-    size_t next = 0;               // in `through`: of the next such ray
+    uint32_t kept_max = UINT32_MAX;  // rays that are worth remembering, see RayEnds::keptMax()
+    std::vector<uint32_t> ends;      // per ray
+    std::vector<PathEnd> through;    // of all rays that are RayEnd::through, one after another
+    size_t next = 0;                 // in `through`: of the next such ray
 
     void clear() {
         ends.clear();
@@ -54,6 +55,9 @@ class RayEnds {
 
     // 0: nothing is remembered.
     size_t rows() const { return rows_; }
+    // So many rays of each row are remembered at most: of a large level fewer, or they would be most of a cook's memory
+    // and push all else out of the cache.
+    uint32_t keptMax() const;
     // Replaces `out`. Thread-safe.
     void get(size_t row, RowEnds& out) const;
     // Those of a block of rows (sparse_light.h) at once, none of them unknown; other blocks may be put at the same
@@ -93,11 +97,12 @@ class RayEnds {
 // Of one level, for each of its receivers; filled in where they are empty.
 struct RememberedRays {
     RayEnds links;   // of the series
-    RayEnds gather;  // of the final gather, the first `kept_rays_max` of each receiver
+    RayEnds gather;  // of the final gather, the first RayEnds::keptMax() of each receiver
 };
 
 // At some 18 bits each 2 kB a receiver and what those through leaves read, where single terms need so many; `preview`
-// ends at 512.
+// ends at 512. From 230,000 receivers on it is the bytes that end them.
 inline constexpr uint32_t kept_rays_max = 1024;
+inline constexpr size_t kept_bytes_max = size_t{512} << 20;
 
 }  // namespace dimmer::cook

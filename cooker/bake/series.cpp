@@ -60,12 +60,23 @@ class Expansion {
     }
 
     Series run() {
-        directPass();
+        directPass(UINT32_MAX);
         bounce();
+        out_.radiance = outgoing(out_.bounced, true);
         decideActivity();
         out_.rays = rays_traced_;
         out_.doors_seen = std::move(doors_seen_);
         return std::move(out_);
+    }
+
+    std::vector<double> flux() {
+        directPass(1);
+        bounce();
+        std::vector<double> sums(terms_);
+        forEachPair([&](size_t i, uint32_t t, float, float, float stored) {
+            sums[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
+        });
+        return sums;
     }
 
    private:
@@ -81,7 +92,8 @@ class Expansion {
 
     // What surfaces reflect at the first bounce: punctual light, emitters and the sky. The rays that look for emitters
     // and sky leave behind which receivers see one another: the links that the series follows.
-    void directPass() {
+    // `light_points`: each lamp is asked for from so many of a receiver's points at most.
+    void directPass(uint32_t light_points) {
         progress_.stage("direct light and links", receivers_);
         links_ = Links(receivers_, settings_.series_rays);
         const bool remembers = ends_ && ends_->rows() == 0;
@@ -112,7 +124,7 @@ class Expansion {
                 ends.ends.assign(ends_ ? options.rays : 0, RayEnd::unknown);
                 if (known) known->get(i, ends);
                 own_options.row = ends.ends.size() < options.rays ? nullptr : &ends;
-                traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full) + options.rays;
+                traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full, light_points) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
                     const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;
@@ -313,7 +325,6 @@ class Expansion {
         }
         links_ = {};
         door_links_ = {};
-        out_.radiance = outgoing(out_.bounced, true);
     }
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every
@@ -499,6 +510,11 @@ void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups, RayEnds* links) {
     return Expansion(gatherer, settings, progress, groups, links).run();
+}
+
+std::vector<double> termFlux(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+                             std::span<const uint8_t> groups, RayEnds* links) {
+    return Expansion(gatherer, settings, progress, groups, links).flux();
 }
 
 }  // namespace dimmer::cook

@@ -6,9 +6,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <glm/glm.hpp>
 #include <numeric>
 #include <span>
@@ -124,12 +126,13 @@ bool fits(const Sparse<Entry>& light, size_t rows, size_t terms) {
     return true;
 }
 
-// One worker's dense scratch over terms, emptied in time proportional to what was touched (and an eighth of the rest).
+// One worker's dense scratch over terms, read and emptied in time proportional to what was touched (and a 64th of the
+// rest: levels with many doors have thousands of terms, of which some ten are touched).
 template <class Value>
 class TermAccumulator {
    public:
     explicit TermAccumulator(uint32_t terms)
-        : values_(terms), marks_((terms + marks_per_word - 1) / marks_per_word * marks_per_word), into_(terms) {
+        : slots_(terms), marks_((terms + marks_per_line - 1) / marks_per_line * marks_per_line), into_(terms) {
         std::iota(into_.begin(), into_.end(), 0u);
     }
 
@@ -142,30 +145,41 @@ class TermAccumulator {
     void wantNone() { std::ranges::fill(into_, no_term); }
 
     Value& operator[](uint32_t term) {
-        marks_[term] = 1;  // a byte each: bits of one word would make every term wait for the one before
-        return values_[term];
+        marks_[term] = Mark::Set;
+        return slots_[term].value;
     }
     // Terms touched since the last clear, ascending.
     std::span<const uint32_t> touched() {
         touched_.clear();
-        for (uint32_t first = 0; first < marks_.size(); first += marks_per_word) {
-            uint64_t word;
-            std::memcpy(&word, &marks_[first], sizeof word);
-            for (; word != 0; word &= word - 1)  // marks are 1, so that each has one bit
-                touched_.push_back(first + static_cast<uint32_t>(std::countr_zero(word)) / 8);
+        for (uint32_t first = 0; first < marks_.size(); first += marks_per_line) {
+            std::array<uint64_t, marks_per_line / marks_per_word> words;
+            std::memcpy(&words, &marks_[first], sizeof words);
+            if (std::accumulate(words.begin(), words.end(), uint64_t{0}, std::bit_or()) == 0) continue;
+            for (uint32_t w = 0; w < words.size(); ++w)
+                for (uint64_t word = words[w]; word != 0; word &= word - 1)  // marks are 1, so that each has one bit
+                    touched_.push_back(first + w * marks_per_word + static_cast<uint32_t>(std::countr_zero(word)) / 8);
         }
         return touched_;
     }
     void clear() {
-        for (uint32_t t : touched()) values_[t] = Value{};
-        std::ranges::fill(marks_, uint8_t{0});
+        for (uint32_t t : touched()) {
+            slots_[t].value = Value{};
+            marks_[t] = Mark::None;
+        }
     }
 
    private:
-    static constexpr uint32_t marks_per_word = sizeof(uint64_t);
+    // A byte each: bits of one word would make every term wait for the one before. Not a number of a byte, which might
+    // lie in any object: each store would load all pointers anew.
+    enum class Mark : uint8_t { None, Set };
+    static constexpr uint32_t marks_per_word = sizeof(uint64_t), marks_per_line = 64;
+    // No sum lies across two lines of memory where it need not.
+    struct alignas(std::min<size_t>(std::bit_ceil(sizeof(Value)), 32)) Slot {
+        Value value{};
+    };
 
-    std::vector<Value> values_;
-    std::vector<uint8_t> marks_;  // per term, and up to a whole word
+    std::vector<Slot> slots_;
+    std::vector<Mark> marks_;  // per term, and up to a whole line
     std::vector<uint32_t> into_;
     std::vector<uint32_t> touched_;
 };

@@ -101,13 +101,14 @@ constexpr size_t stored_floats = sizeof(Stored<Entry>) / sizeof(float);
 // Counts, terms, and the values in columns of floats.
 template <class Entry>
 void putRows(ByteWriter& out, const Sparse<Entry>& light) {
-    std::vector<uint16_t> counts, terms;
+    std::vector<uint16_t> counts;
+    std::vector<uint32_t> terms;  // a level with many doors has more than 65,535
     std::vector<float> columns(light.entryCount() * stored_floats<Entry>);
     size_t n = 0;
     for (size_t i = 0; i < light.rows(); ++i) {
         counts.push_back(static_cast<uint16_t>(light.row(i).size()));
         for (const Entry& l : light.row(i)) {
-            terms.push_back(static_cast<uint16_t>(l.term));
+            terms.push_back(l.term);
             const auto values = std::bit_cast<std::array<float, stored_floats<Entry>>>(stored(l));
             for (size_t f = 0; f < values.size(); ++f) columns[f * light.entryCount() + n] = values[f];
             ++n;
@@ -121,7 +122,7 @@ void putRows(ByteWriter& out, const Sparse<Entry>& light) {
 template <class Entry>
 std::optional<Sparse<Entry>> getRows(ByteReader& in) {
     const auto counts = in.getArray<uint16_t>();
-    const auto terms = in.getArray<uint16_t>();
+    const auto terms = in.getArray<uint32_t>();
     const std::vector<float> columns = getFloats(in);
     if (!in.ok() || columns.size() != terms.size() * stored_floats<Entry>) return {};
     typename Sparse<Entry>::Builder rows(counts.size());

@@ -63,6 +63,7 @@ std::vector<std::byte> encode(std::span<const std::byte> bytes, std::string_view
     std::byte* stored = file.data() + sizeof(EntryHeader);
     const size_t size =
         ZSTD_compress(stored, file.size() - sizeof(EntryHeader), bytes.data(), bytes.size(), compression_level);
+    if (ZSTD_isError(size)) throw std::bad_alloc();  // all else fits
     const XXH128_hash_t hash = hashOf({stored, size}, name);
     const EntryHeader header{entry_magic, size, bytes.size(), hash.high64, hash.low64};
     std::memcpy(file.data(), &header, sizeof(header));

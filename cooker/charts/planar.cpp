@@ -1,5 +1,7 @@
 #include <charts/planar.h>
 
+#include <charts/raster.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -18,6 +20,8 @@ constexpr float filter_reach_texels = 2;
 // A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
 constexpr float waste_max = 1.3f;
 constexpr float waste_free_texels = 16;
+// A surface this high over another one hides it: the points that texels are lit at lie lower (texels.cpp).
+constexpr float hiding_m = 5e-4f;
 
 struct Rect {
     glm::vec2 min{1e30f}, max{-1e30f};
@@ -60,6 +64,14 @@ struct Contact {
     uint32_t a, b;  // positions within the plane's list
 };
 
+// Faces that must not share a chart; each pair both ways round.
+using Apart = std::set<std::pair<uint32_t, uint32_t>>;
+
+void keepApart(Apart& apart, uint32_t a, uint32_t b) {
+    apart.insert({a, b});
+    apart.insert({b, a});
+}
+
 // Charts of one plane: a union-find over its faces.
 class PlaneGrouper {
    public:
@@ -78,9 +90,9 @@ class PlaneGrouper {
     }
 
     std::vector<PlanarChart> charts(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
-        merge({});
-        const auto walls = findWalls(blocked);
-        if (!walls.empty()) merge(walls);
+        Apart apart = findStacks();
+        merge(apart);
+        if (findWalls(blocked, apart)) merge(apart);
         std::map<uint32_t, PlanarChart> by_root;
         for (uint32_t i = 0; i < ids_.size(); ++i) {
             const uint32_t root = find(i);
@@ -136,18 +148,18 @@ class PlaneGrouper {
     }
 
     // Longest contacts first, so that a doorway's strip joins one room rather than joining two rooms.
-    void merge(const std::set<std::pair<uint32_t, uint32_t>>& walls) {
+    void merge(const Apart& apart) {
         parent_.resize(ids_.size());
         std::iota(parent_.begin(), parent_.end(), 0u);
-        rects_.assign(ids_.size(), {});
+        rects_.resize(ids_.size());
         members_.assign(ids_.size(), {});
         for (uint32_t i = 0; i < ids_.size(); ++i) {
-            for (glm::vec2 p : flat_[i]) rects_[i].add(p);
+            rects_[i] = rectOf(i);
             members_[i] = {i};
         }
         for (const Contact& c : contacts_) {
             uint32_t a = find(c.a), b = find(c.b);
-            if (a == b || !fitsTogether(a, b) || walled(a, b, walls)) continue;
+            if (a == b || !fitsTogether(a, b) || areApart(a, b, apart)) continue;
             if (members_[a].size() < members_[b].size()) std::swap(a, b);
             parent_[b] = a;
             rects_[a].add(rects_[b]);
@@ -165,33 +177,75 @@ class PlaneGrouper {
                waste_max * (rects_[a].area() + rects_[b].area()) + waste_free_texels / (density_ * density_);
     }
 
-    bool walled(uint32_t a, uint32_t b, const std::set<std::pair<uint32_t, uint32_t>>& walls) const {
-        if (walls.empty()) return false;
+    bool areApart(uint32_t a, uint32_t b, const Apart& apart) {
+        if (members_[a].size() > members_[b].size()) std::swap(a, b);
         for (uint32_t i : members_[a])
-            for (uint32_t j : members_[b])
-                if (walls.contains(std::minmax(i, j))) return true;
+            for (auto it = apart.lower_bound({i, 0}); it != apart.end() && it->first == i; ++it)
+                if (find(it->second) == b) return true;
         return false;
     }
 
-    // Pairs of faces of one chart that come within the filter's reach of one another with a wall between.
-    std::set<std::pair<uint32_t, uint32_t>> findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
-        std::set<std::pair<uint32_t, uint32_t>> walls;
+    // Pairs of faces of which one lies over the other, as a rug on a floor does. In one chart they would have the same
+    // texels, and what hides the lower one would make them black.
+    Apart findStacks() const {
+        std::vector<Rect> rects(ids_.size());
+        std::vector<uint32_t> order(ids_.size());
+        for (uint32_t i = 0; i < ids_.size(); ++i) rects[i] = rectOf(i);
+        std::iota(order.begin(), order.end(), 0u);
+        std::ranges::sort(order, {}, [&](uint32_t i) { return std::pair(rects[i].min.x, i); });
+        Apart stacks;
+        for (size_t i = 0; i < order.size(); ++i)
+            for (size_t j = i + 1; j < order.size(); ++j) {
+                const uint32_t a = order[i], b = order[j];
+                if (rects[b].min.x >= rects[a].max.x) break;
+                if (rects[a].min.y >= rects[b].max.y || rects[b].min.y >= rects[a].max.y) continue;
+                if (liesOff(a, b) && liesOff(b, a) && !edgeParts(a, b) && !edgeParts(b, a)) keepApart(stacks, a, b);
+            }
+        return stacks;
+    }
+
+    // Whether all of `a` is on one side of b's plane, too far off to be lit as if it were in it.
+    bool liesOff(uint32_t a, uint32_t b) const {
+        const PlanarFace& plane = all_[ids_[b]];
+        float low = 1e30f, high = -1e30f;
+        for (glm::vec3 p : all_[ids_[a]].corners_m) {
+            const float d = glm::dot(plane.normal, p - plane.corners_m[0]);
+            low = std::min(low, d), high = std::max(high, d);
+        }
+        return low > hiding_m || high < -hiding_m;
+    }
+
+    // Whether `b` lies beyond an edge of `a`, but for the width of an edge.
+    bool edgeParts(uint32_t a, uint32_t b) const {
+        for (size_t e = 0; e < 3; ++e) {
+            const glm::vec2 from = flat_[a][e], along = glm::normalize(flat_[a][(e + 1) % 3] - from);
+            if (std::ranges::all_of(flat_[b], [&](glm::vec2 p) { return cross2d(along, p - from) < touching_m; }))
+                return true;
+        }
+        return false;
+    }
+
+    // Adds the pairs of faces of one chart that come within the filter's reach of one another with a wall between.
+    bool findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked, Apart& apart) const {
+        const size_t before = apart.size();
         const float reach = filter_reach_texels / density_;
         for (const auto& members : members_)
             for (size_t a = 0; a < members.size(); ++a)
                 for (size_t b = a + 1; b < members.size(); ++b)
                     if (near(members[a], members[b], reach) && (wallBetween(members[a], members[b], reach, blocked) ||
                                                                 wallBetween(members[b], members[a], reach, blocked)))
-                        walls.insert(std::minmax(members[a], members[b]));
-        return walls;
+                        keepApart(apart, members[a], members[b]);
+        return apart.size() > before;
+    }
+
+    Rect rectOf(uint32_t face) const {
+        Rect rect;
+        for (glm::vec2 p : flat_[face]) rect.add(p);
+        return rect;
     }
 
     bool near(uint32_t a, uint32_t b, float reach) const {
-        Rect ra, rb;
-        for (size_t i = 0; i < 3; ++i) {
-            ra.add(flat_[a][i]);
-            rb.add(flat_[b][i]);
-        }
+        const Rect ra = rectOf(a), rb = rectOf(b);
         return glm::all(glm::lessThan(ra.min, rb.max + reach)) && glm::all(glm::lessThan(rb.min, ra.max + reach));
     }
 

@@ -27,6 +27,11 @@ struct PlanarChart {
     std::vector<uint32_t> faces;  // indices into the input, ascending
 };
 
+// Doors move, so their leaves share no chart with the level, nor closed ones with open ones.
+inline uint32_t chartGroup(const SceneMesh& mesh) {
+    return mesh.door ? 2 * *mesh.door + mesh.is_open_leaf + 1 : 0;
+}
+
 // `blocked(a, b)`: something opaque stands on the straight line between two points.
 // Deterministic; O(n log n) but for charts of very many faces.
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,

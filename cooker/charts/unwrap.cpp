@@ -14,8 +14,6 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t padding_texels = 1;
-// Overlaps of a file's own UVs are looked for on a grid this fine.
-constexpr uint32_t overlap_grid = 1024;
 
 // A chart before it has a place: its size with padding, and its faces' corners relative to its rectangle.
 struct Placed {
@@ -41,39 +39,6 @@ std::vector<Face> listFaces(const RayScene& rays) {
         if (scene.materials[triangle.material].double_sided) faces.push_back({t, true});
     }
     return faces;
-}
-
-// Whether the mesh's TEXCOORD_1 is an unwrap: inside 0..1, every triangle with area, no two on one spot.
-bool validUnwrap(const SceneMesh& mesh, std::string& why) {
-    std::vector<uint8_t> taken(size_t{overlap_grid} * overlap_grid);
-    const float grid = overlap_grid;
-    for (const glm::uvec3 triangle : mesh.triangles) {
-        std::array<glm::vec2, 3> uv;
-        for (int i = 0; i < 3; ++i) {
-            uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
-            const glm::vec2 c = uv[static_cast<size_t>(i)];
-            if (!(c.x >= 0 && c.x <= 1 && c.y >= 0 && c.y <= 1)) {
-                why = "they leave 0..1";
-                return false;
-            }
-        }
-        if (std::abs(cross2d(uv[1] - uv[0], uv[2] - uv[0])) < 1e-12f) {
-            why = "a triangle has no area in them";
-            return false;
-        }
-        for (auto& c : uv) c *= grid;
-        bool overlaps = false;
-        forEachCoveredCentre(uv, {overlap_grid, overlap_grid}, [&](uint32_t x, uint32_t y) {
-            uint8_t& cell = taken[size_t{y} * overlap_grid + x];
-            overlaps = overlaps || cell != 0;
-            cell = 1;
-        });
-        if (overlaps) {
-            why = "they overlap";
-            return false;
-        }
-    }
-    return true;
 }
 
 // A surface larger than a page is stored as coarse as fits one: told once for each mesh.
@@ -216,16 +181,10 @@ bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& o
 
 std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& options, Unwrap& out) {
     const Scene& scene = rays.scene();
-    std::vector<bool> use_file_uv(scene.meshes.size());
-    for (size_t m = 0; m < scene.meshes.size(); ++m) {
-        const SceneMesh& mesh = scene.meshes[m];
-        std::string why;
-        if (mesh.uv1.empty() || mesh.triangles.empty() || !hasLightmap(mesh)) continue;
-        use_file_uv[m] = validUnwrap(mesh, why);
-        if (!use_file_uv[m])
+    for (const SceneMesh& mesh : scene.meshes)
+        if (!mesh.uv1_fault.empty())
             out.warnings.push_back(fmt::format("{}: node '{}': TEXCOORD_1 is no lightmap unwrap ({}); charts were made",
-                                               scene.file, mesh.node, why));
-    }
+                                               scene.file, mesh.node, mesh.uv1_fault));
     std::vector<Placed> charts;
     std::vector<PlanarFace> planar;
     std::vector<uint32_t> planar_ids;
@@ -234,15 +193,14 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
         const Face face = out.faces[id];
         const uint32_t m = rays.triangles()[face.triangle].mesh;
         const SceneMesh& mesh = scene.meshes[m];
-        if (use_file_uv[m] && !face.back) {
+        if (!mesh.uv1.empty() && !face.back) {
             file_faces[m].push_back(id);
             continue;
         }
         const glm::vec3 normal = rays.triangles()[face.triangle].normal;
-        // Doors move, so they share no chart with the level.
         planar.push_back(
             {corners(rays, face), face.back ? -normal : normal,
-             mesh.texels_per_metre.value_or(options.texels_per_metre), mesh.door ? *mesh.door + 1 : 0,
+             mesh.texels_per_metre.value_or(options.texels_per_metre), chartGroup(mesh),
              mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[rays.triangles()[face.triangle].triangle]});
         planar_ids.push_back(id);
     }

@@ -55,8 +55,9 @@ struct UnwrapOptions {
     uint32_t page_size = 2048;  // largest side of a page, at most 4096
 };
 
-// TEXCOORD_1 is used where it is a valid unwrap; everything else gets planar charts: coplanar faces that share an
-// edge, as long as no wall stands between parts that come close to one another (filtering would leak through it).
+// SceneMesh::uv1 is used where there is one, and must be an unwrap: cutAtWalls() sees to that. Everything else gets
+// planar charts: coplanar faces that share an edge, as long as no wall stands between parts that come close to one
+// another (filtering would leak through it).
 Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options);
 
 // Texels of the pages that charts of these sizes fill, as unwrap() packs them; UINT64_MAX: of too many pages.

@@ -1,5 +1,6 @@
 #include <charts/wall_cuts.h>
 
+#include <charts/file_uv.h>
 #include <charts/planar.h>
 
 #include <tbb/parallel_for.h>
@@ -68,25 +69,15 @@ std::vector<glm::vec2> clip(const std::vector<glm::vec2>& polygon, const Cut& cu
 class WallCutter {
    public:
     WallCutter(Scene& scene, float texels_per_metre) : scene_(scene) {
-        for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
-            const SceneMesh& mesh = scene.meshes[m];
-            if (!hasLightmap(mesh)) continue;
-            for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-                std::array<glm::vec3, 3> c;
-                for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];
-                const glm::vec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
-                faces_.push_back(
-                    {c, normal, mesh.texels_per_metre.value_or(texels_per_metre), mesh.door ? *mesh.door + 1 : 0});
-                sources_.push_back({m, t});
-                cuttable_.push_back(mesh.uv1.empty());
-                blocks_.push_back(scene.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque);
-            }
-        }
+        addFaces(false, texels_per_metre);
+        cuttable_ = faces_.size();
+        addFaces(true, texels_per_metre);
     }
 
     void run() {
         constexpr uint32_t no_side_limit = 1u << 20;
-        const auto charts = planarCharts(faces_, no_side_limit, [](glm::vec3, glm::vec3) { return false; });
+        const auto charts =
+            planarCharts(std::span(faces_).first(cuttable_), no_side_limit, [](glm::vec3, glm::vec3) { return false; });
         std::vector<std::vector<std::vector<Piece>>> parts(charts.size());
         tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
         uint32_t region = 0;
@@ -111,9 +102,22 @@ class WallCutter {
     };
     using Replacements = std::map<uint32_t, std::vector<Replacement>>;
 
+    void addFaces(bool of_unwraps, float texels_per_metre) {
+        for (uint32_t m = 0; m < scene_.meshes.size(); ++m) {
+            const SceneMesh& mesh = scene_.meshes[m];
+            if (!hasLightmap(mesh) || mesh.uv1.empty() == of_unwraps) continue;
+            for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+                std::array<glm::vec3, 3> c;
+                for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];
+                const glm::vec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+                faces_.push_back({c, normal, mesh.texels_per_metre.value_or(texels_per_metre), chartGroup(mesh)});
+                sources_.push_back({m, t});
+                blocks_.push_back(scene_.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque);
+            }
+        }
+    }
+
     std::vector<std::vector<Piece>> partsOf(const PlanarChart& chart) const {
-        for (uint32_t face : chart.faces)
-            if (!cuttable_[face]) return {};
         const std::vector<Cut> cuts = findCuts(chart);
         if (cuts.empty()) return {};
         std::vector<Piece> all;
@@ -314,12 +318,14 @@ class WallCutter {
     Scene& scene_;
     std::vector<PlanarFace> faces_;
     std::vector<Source> sources_;
-    std::vector<bool> cuttable_, blocks_;
+    std::vector<bool> blocks_;
+    size_t cuttable_ = 0;  // the first so many faces; the others' meshes bring an unwrap, and they only block
 };
 
 }  // namespace
 
 void cutAtWalls(Scene& scene, float texels_per_metre) {
+    dropInvalidUnwraps(scene);
     WallCutter(scene, texels_per_metre).run();
 }
 

@@ -9,7 +9,8 @@ namespace dimmer::cook {
 // would leak light through the wall. Where a wall (or a closed door) thinner than the filter's reach stands on a plane
 // of the level, the triangles of that plane are cut along the wall's middle, and SceneMesh::triangle_regions tells the
 // two sides apart. Walls count when they are axis-aligned in the plane's own chart and a few texels long, all their
-// stretches together. Positions, normals and UVs are interpolated: the surface stays the same.
+// stretches together. Positions, normals and UVs are interpolated: the surface stays the same. Meshes that bring an
+// unwrap stay whole; one that is none is dropped before (charts/file_uv.h), and its mesh cut like any other.
 void cutAtWalls(Scene& scene, float texels_per_metre);
 
 }  // namespace dimmer::cook

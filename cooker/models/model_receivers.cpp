@@ -78,9 +78,7 @@ float areaPerPoint(const SceneModel& model) {
 void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
     const Scene& scene = rays.scene();
     const float area_per_point = areaPerPoint(scene.models[model]);
-    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
-        const LevelTriangle& triangle = rays.triangles()[t];
-        if (scene.meshes[triangle.mesh].model != model) continue;
+    forTriangles(rays, model, [&](uint32_t t, const LevelTriangle& triangle) {
         const Material& material = scene.materials[triangle.material];
         const glm::vec3 a = rays.corner(t, 0);
         const float area = 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));
@@ -95,7 +93,7 @@ void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
             if (material.double_sided)
                 visit(rays.pointOn(t, u, v), -triangle.normal, area / static_cast<float>(points), rho);
         }
-    }
+    });
 }
 
 // Of the points of a surface that count for a receiver, some are drawn without replacement, by weight (Efraimidis and

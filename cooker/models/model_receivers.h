@@ -4,7 +4,9 @@
 #pragma once
 
 #include <charts/texels.h>
+#include <trace/ray_scene.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -30,6 +32,14 @@ struct ProbePlaces {
     // no_index where none of the model's is.
     std::vector<uint32_t> source;
 };
+
+// visit(number, triangle) for the level's triangles of a model, in their order. Costs nothing for those of others, of
+// which a level may have a thousand times as many.
+void forTriangles(const RayScene& rays, uint32_t model, auto&& visit) {
+    for (const uint32_t mesh : rays.scene().models[model].meshes)
+        for (const LevelTriangle& t : std::ranges::equal_range(rays.triangles(), mesh, {}, &LevelTriangle::mesh))
+            visit(static_cast<uint32_t>(&t - rays.triangles().data()), t);
+}
 
 class ModelReceivers {
    public:

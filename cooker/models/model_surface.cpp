@@ -28,9 +28,7 @@ Sides sidesOf(const RayScene& rays, uint32_t model) {
     const Scene& scene = rays.scene();
     Sides sides;
     double sum = 0;
-    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
-        const LevelTriangle& triangle = rays.triangles()[t];
-        if (scene.meshes[triangle.mesh].model != model) continue;
+    forTriangles(rays, model, [&](uint32_t t, const LevelTriangle& triangle) {
         const glm::vec3 a = rays.corner(t, 0);
         const double area_m2 =
             0.5 * static_cast<double>(glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a)));
@@ -38,7 +36,7 @@ Sides sidesOf(const RayScene& rays, uint32_t model) {
             sides.face.push_back(triangle_faces + 2 * t + back);
             sides.cumulative_m2.push_back(sum += area_m2);
         }
-    }
+    });
     return sides;
 }
 

@@ -286,6 +286,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         findTransfers(scene);
         const auto buried = warningsOfBuriedLights(*level.rays);
         stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
+        if (auto warning = farFromOrigin(*level.rays)) stats.warnings.push_back(std::move(*warning));
         progress.advance(1);
     }
     const Unwrap& charts = level.charts;
@@ -303,11 +304,11 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         StageTimer timer(progress, stats.bake_seconds);
         baked = bakeWithCache(level, settings, scales, timer, cache);
         multiplyByScales(scales, baked);
-        limitOverlap(baked, profile.overlap_max);
+        limitOverlap(baked, texels.area_m2, profile.overlap_max);
         if (losses)
             *losses = LossTable(baked, texels, settings.group_thresholds, chartSizes(rays, charts, profile.page_size));
     }
-    stats.rays = baked.rays;
+    stats.rays += baked.rays;
     stats.bounces = baked.bounces;
     for (const std::string& w : baked.warnings) stats.warnings.push_back(scene.file + ": " + w);
     {

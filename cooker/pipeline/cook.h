@@ -37,7 +37,7 @@ struct CookOptions {
 struct CookStats {
     std::map<std::string, double> seconds;  // per stage
     StageSeconds bake_seconds;              // of "bake", what its stages took; not what reads and keeps entries
-    uint64_t rays = 0;
+    uint64_t rays = 0;                      // of every round of a fit, as the seconds are
     uint32_t bounces = 0;
     double free_volume_m3 = 0;  // of the level, where probes may stand
     uint64_t peak_bytes = 0;    // of the whole process

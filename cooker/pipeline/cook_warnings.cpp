@@ -25,4 +25,16 @@ std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
         scene.file, lost_lux, cause);
 }
 
+std::optional<std::string> farFromOrigin(const RayScene& rays) {
+    // A step of floats is 0.24 mm from here on, and points of surfaces lie 0.5 mm off them.
+    constexpr float far_m = 2048;
+    const glm::vec3 farthest = glm::max(glm::abs(rays.boundsMin()), glm::abs(rays.boundsMax()));
+    const float most_m = std::max({farthest.x, farthest.y, farthest.z});
+    if (most_m <= far_m) return {};
+    return fmt::format(
+        "{}: reaches {:.0f} m from the origin: beyond {:.0f} m walls are placed too coarsely to be lit rightly; move the "
+        "level to the origin, or cook it in parts",
+        rays.scene().file, most_m, far_m);
+}
+
 }  // namespace dimmer::cook

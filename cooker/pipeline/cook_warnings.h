@@ -2,6 +2,7 @@
 #pragma once
 
 #include <scene/scene.h>
+#include <trace/ray_scene.h>
 
 #include <optional>
 #include <string>
@@ -11,5 +12,9 @@ namespace dimmer::cook {
 // The exposure leaves room for every set at its largest weight at once; an absurd one leaves the rest of the level
 // black.
 std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
+
+// Coordinates are floats: so far from the origin walls are rounded by more than what keeps rays off them, and are lit
+// from behind themselves.
+std::optional<std::string> farFromOrigin(const RayScene& rays);
 
 }  // namespace dimmer::cook

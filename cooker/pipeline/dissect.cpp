@@ -44,29 +44,37 @@ struct Rebake {
     Series series;
 };
 
-Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress& progress) {
-    const auto settings = readSettings(pack.data().settings_json);
-    if (!settings) return std::unexpected(settings.error());
-    const Quality& quality = *settings->profile.quality(settings->quality);
+// As far as its charts, which must be the pack's.
+Expected<std::unique_ptr<Rebake>> rechart(Scene scene, const CookSettings& settings, const Pack& pack) {
     auto bake = std::make_unique<Rebake>();
     bake->scene = std::move(scene);
     bake->scales = divideByScales(bake->scene);
-    prepareScene(bake->scene, settings->profile);
-    cutAtWalls(bake->scene, settings->profile.texels_per_metre);
+    prepareScene(bake->scene, settings.profile);
+    cutAtWalls(bake->scene, settings.profile.texels_per_metre);
     bake->rays.emplace(bake->scene);
-    auto charts = unwrap(*bake->rays, {settings->profile.texels_per_metre, settings->profile.page_size});
+    auto charts = unwrap(*bake->rays, {settings.profile.texels_per_metre, settings.profile.page_size});
     if (!charts) return std::unexpected(charts.error());
     bake->charts = std::move(*charts);
     if (bake->charts.page_width != pack.pageWidth() || bake->charts.page_height != pack.pageHeight() ||
         bake->charts.page_count != pack.pageCount())
         return fail(ErrorCode::BadInput, "the pack's pages are not those of this level; cook the level again");
+    return bake;
+}
+
+Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress& progress) {
+    const auto settings = readSettings(pack.data().settings_json);
+    if (!settings) return std::unexpected(settings.error());
+    auto charted = rechart(std::move(scene), *settings, pack);
+    if (!charted) return charted;
+    std::unique_ptr<Rebake>& bake = *charted;
+    const Quality& quality = *settings->profile.quality(settings->quality);
     bake->texels = sampleTexels(*bake->rays, bake->charts, quality.samples_per_texel);
     bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
     bake->paths.emplace(bake->scene, doorsInSight(*bake->rays));
     bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
     bake->settings = bakeSettings(settings->profile, quality, bake->scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
-    return bake;
+    return charted;
 }
 
 // The texels that a bilinear filter mixes at a point.
@@ -324,6 +332,13 @@ void measureStorage(Storage& s, TermAccumulator<Falloff>& sum, std::span<const g
 }
 
 }  // namespace
+
+Expected<void> checkRebake(const Scene& scene, const Pack& pack) {
+    const auto settings = readSettings(pack.data().settings_json);
+    if (!settings) return std::unexpected(settings.error());
+    const auto charted = rechart(scene, *settings, pack);
+    return charted ? Expected<void>() : std::unexpected(charted.error());
+}
 
 Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::span<const VerifyPoint> points,
                                   std::span<const LightPair> pairs, const ReferenceState& state, double floor_lux,

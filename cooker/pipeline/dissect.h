@@ -20,6 +20,10 @@ namespace dimmer::cook {
 // They need not add up to the whole error: they can cancel.
 using ErrorCauses = std::map<std::string, double>;
 
+// Whether the pack's settings can be read and give its pages again: what both functions below need. Cost: a cook's
+// charts.
+Expected<void> checkRebake(const Scene& scene, const Pack& pack);
+
 // Bakes the first passes of `scene` again, as the pack's settings say, and gathers at `points`. `pairs`: per point, the
 // pack's light and the reference in this state; doors are closed. Cost: the cook without its last pass, and some 50,000
 // rays per point.

@@ -11,7 +11,6 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <fstream>
 #include <set>
 
 namespace dimmer::cook {
@@ -36,31 +35,18 @@ Expected<void> removeFile(const std::filesystem::path& file) {
     return fail(ErrorCode::Io, fmt::format("{}: it cannot be removed: {}", file.string(), problem.message()));
 }
 
-// Files of an earlier export, as its index has them; anybody may have written that.
-std::vector<std::string> picturesOf(const Json& index) {
-    std::vector<std::string> names;
-    const auto add = [&](const Json& pictures) {
-        for (const Json& p : pictures)
-            if (p.is_object() && p.contains("file") && p["file"].is_string()) names.push_back(p["file"]);
-    };
-    if (!index.is_object()) return names;
-    if (index.contains("base")) add(index["base"]);
-    if (index.contains("contributions"))
-        for (const Json& c : index["contributions"])
-            if (c.is_object() && c.contains("pictures")) add(c["pictures"]);
-    std::erase_if(names, [](const std::string& name) { return !isExportedName(name); });
-    return names;
-}
-
-// The index first: without it the rest is no export.
+// The index first: without it the rest is no export. What an interrupted one left goes, too, and has none.
 Expected<void> removeExport(const std::filesystem::path& folder) {
-    std::ifstream in(folder / index_name);
-    if (!in) return {};
-    const Json index = Json::parse(in, nullptr, false);
-    in.close();
     if (auto ok = removeFile(folder / index_name); !ok) return ok;
-    for (const std::string& picture : picturesOf(index))
-        if (auto ok = removeFile(folder / picture); !ok) return ok;
+    std::vector<std::filesystem::path> pictures;
+    std::error_code problem;
+    for (std::filesystem::directory_iterator entry(folder, problem); !problem && entry != end(entry);
+         entry.increment(problem))
+        if (isExportedName(entry->path().filename().native())) pictures.push_back(entry->path());
+    if (problem)
+        return fail(ErrorCode::Io, fmt::format("{}: it cannot be listed: {}", folder.string(), problem.message()));
+    for (const std::filesystem::path& picture : pictures)
+        if (auto ok = removeFile(picture); !ok) return ok;
     return {};
 }
 

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <system_error>
 
 namespace dimmer::cook {
@@ -41,6 +42,16 @@ struct Picture {
 
 }  // namespace
 
+std::string heatMapName(uint32_t page) {
+    return fmt::format("page_{}.png", page);
+}
+
+bool isHeatMapName(std::string_view name) {
+    const std::string text(name);
+    uint32_t page = 0;
+    return std::sscanf(text.c_str(), "page_%u", &page) == 1 && text == heatMapName(page);
+}
+
 Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pack, const VerifyReport& report,
                              std::string_view state) {
     std::error_code error;
@@ -65,7 +76,7 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
                          static_cast<double>(report.points[i].uv[1]) * picture.height, radius,
                          heat((p.value_lux - p.reference_lux) / (p.reference_lux + report.floor_lux)));
         }
-        const auto file = folder / fmt::format("page_{}.png", page);
+        const auto file = folder / heatMapName(page);
         const auto png = pngBytes(pack.pageWidth(), pack.pageHeight(), 3, picture.rgb);
         if (!png) return std::unexpected(png.error());
         if (auto ok = writeFileAtomically(file, *png); !ok) return ok;

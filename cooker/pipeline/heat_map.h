@@ -4,11 +4,17 @@
 #include <pipeline/verify.h>
 
 #include <filesystem>
+#include <string>
+#include <string_view>
 
 namespace dimmer::cook {
 
 // Errors at and above this are drawn in the hottest colour; beyond, 25 % is 25 %.
 inline constexpr double heat_full_error = 0.5;
+
+// The name of a page's picture: "page_0.png".
+std::string heatMapName(uint32_t page);
+bool isHeatMapName(std::string_view name);
 
 // Writes page_0.png, page_1.png, ... into `folder` (created when missing): the pages' luminance in grey, and a disc in
 // false colour per point: blue too dark, white exact, red too bright.

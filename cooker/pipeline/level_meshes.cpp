@@ -1,6 +1,5 @@
 #include <pipeline/level_meshes.h>
 
-#include <map>
 #include <tuple>
 
 namespace dimmer::cook {
@@ -30,10 +29,13 @@ class MeshBuilder {
 
 }  // namespace
 
-glm::vec3 meanReflectance(const Scene& scene, const Material& material) {
-    glm::vec3 color = material.base_color;
-    if (material.base_color_texture) color *= glm::vec3(scene.textures[*material.base_color_texture]->mean());
-    return material.reflectance(color);
+glm::vec3 MeanReflectances::of(uint32_t material) {
+    const auto [it, fresh] = known_.try_emplace(material);
+    if (!fresh) return it->second;
+    const Material& m = scene_.materials[material];
+    glm::vec3 color = m.base_color;
+    if (m.base_color_texture) color *= glm::vec3(scene_.textures[*m.base_color_texture]->mean());
+    return it->second = m.reflectance(color);
 }
 
 std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::span<const glm::vec3> emission_cd_m2) {
@@ -41,6 +43,7 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::s
     const auto sets = static_cast<uint32_t>(scene.light_sets.size());
     const glm::vec2 page_size(unwrap.page_width, unwrap.page_height);
     std::map<std::tuple<uint32_t, uint32_t, uint32_t>, MeshBuilder> builders;  // scene mesh, material, page
+    MeanReflectances reflectances(scene);
     for (uint32_t f = 0; f < unwrap.faces.size(); ++f) {
         const Face face = unwrap.faces[f];
         const LevelTriangle& t = rays.triangles()[face.triangle];
@@ -54,7 +57,7 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::s
             mesh.node = from.node;
             mesh.page = page;
             if (from.door) mesh.door = sets + *from.door;
-            mesh.reflectance = array(meanReflectance(scene, material));
+            mesh.reflectance = array(reflectances.of(t.material));
             const glm::vec3 emission = emission_cd_m2.empty() ? material.emission_cd_m2 : emission_cd_m2[t.material];
             mesh.emission_cd_m2 = array(emission);
             if (emission != glm::vec3(0)) mesh.emission_set = from.light_set;

@@ -4,12 +4,24 @@
 #include <charts/unwrap.h>
 #include <pack/pack_data.h>
 
+#include <cstdint>
+#include <map>
 #include <span>
+#include <vector>
 
 namespace dimmer::cook {
 
-// The one colour that a mesh is drawn with: the material's, times the mean of its texture.
-glm::vec3 meanReflectance(const Scene& scene, const Material& material);
+// The one colour that meshes of a material are drawn with: the material's, times the mean of its texture, which is
+// taken once however many ask.
+class MeanReflectances {
+   public:
+    explicit MeanReflectances(const Scene& scene) : scene_(scene) {}
+    glm::vec3 of(uint32_t material);
+
+   private:
+    const Scene& scene_;
+    std::map<uint32_t, glm::vec3> known_;
+};
 
 // `emission_cd_m2`: per material, in the place of the scene's own; empty: those.
 std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap,

@@ -64,7 +64,7 @@ std::map<MaterialPartKey, MaterialPart> partsOf(const Scene& scene, const SceneM
 class ModelMeshes {
    public:
     ModelMeshes(const Scene& scene, std::span<const glm::vec3> emission_cd_m2, PackData& pack)
-        : scene_(scene), emission_cd_m2_(emission_cd_m2), pack_(pack) {}
+        : scene_(scene), emission_cd_m2_(emission_cd_m2), pack_(pack), reflectances_(scene) {}
 
     // First mesh and their number.
     std::pair<uint32_t, uint32_t> of(const SceneModel& model) {
@@ -84,7 +84,7 @@ class ModelMeshes {
         return {first, static_cast<uint32_t>(pack_.model_meshes.size()) - first};
     }
 
-    ModelMesh meshOf(const SceneModel& model, const MaterialPartKey& key, const MaterialPart& part) const {
+    ModelMesh meshOf(const SceneModel& model, const MaterialPartKey& key, const MaterialPart& part) {
         const Material& material = scene_.materials[key.first];
         const glm::mat3 model_from_world = glm::transpose(model.world_from_model);
         std::vector<glm::vec3> positions;
@@ -98,7 +98,7 @@ class ModelMeshes {
         mesh.name = model.node;
         mesh.min_m = toArray(low);
         mesh.max_m = toArray(high);
-        mesh.reflectance = toArray(meanReflectance(scene_, material));
+        mesh.reflectance = toArray(reflectances_.of(key.first));
         const glm::vec3 emission = emission_cd_m2_.empty() ? material.emission_cd_m2 : emission_cd_m2_[key.first];
         mesh.emission_cd_m2 = toArray(emission);
         if (emission != glm::vec3(0)) mesh.emission_set = key.second;
@@ -113,6 +113,7 @@ class ModelMeshes {
     const Scene& scene_;
     std::span<const glm::vec3> emission_cd_m2_;
     PackData& pack_;
+    MeanReflectances reflectances_;
     std::map<std::pair<ModelShape, std::vector<std::optional<uint32_t>>>, std::pair<uint32_t, uint32_t>> shared_;
 };
 

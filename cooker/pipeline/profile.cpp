@@ -216,6 +216,22 @@ Expected<CookSettings> readSettings(const std::string& settings_json) {
     return out;
 }
 
+nlohmann::ordered_json listedSettings(const std::string& settings_json) {
+    using Json = nlohmann::ordered_json;
+    const auto shallow = [](int depth, Json::parse_event_t event, const Json&) {
+        return depth < 2 || (event != Json::parse_event_t::object_start && event != Json::parse_event_t::array_start);
+    };
+    const Json all = Json::parse(settings_json, shallow, false);
+    Json settings = Json::object();
+    if (!all.is_object()) return settings;
+    for (const auto& [key, setting] : all.items()) {
+        if (!setting.is_object() || !setting.contains("value") || !setting.contains("from")) continue;
+        const auto &value = setting["value"], &from = setting["from"];
+        if (value.is_primitive() && from.is_string()) settings[key] = {{"value", value}, {"from", from}};
+    }
+    return settings;
+}
+
 Expected<Profile> loadProfile(const std::string& name_or_file) {
     const auto source = findSource(name_or_file, {});
     if (!source) return std::unexpected(source.error());
@@ -228,6 +244,19 @@ std::vector<std::string> shippedProfiles() {
     std::vector<std::string> names;
     for (const auto& [name, text] : shipped_profiles) names.emplace_back(name);
     return names;
+}
+
+std::vector<std::filesystem::path> filesExtendedBy(const std::string& name_or_file) {
+    const auto shipped = shippedProfiles();
+    std::vector<std::filesystem::path> files;
+    auto source = findSource(name_or_file, {});
+    for (int depth = 0; source && depth < extends_depth_max; ++depth) {
+        const auto root = parseObject(*source);
+        if (!root || !root->contains("extends") || !root->at("extends").is_string()) break;
+        source = findSource(root->at("extends").get<std::string>(), source->folder);
+        if (source && std::ranges::find(shipped, source->name) == shipped.end()) files.emplace_back(source->name);
+    }
+    return files;
 }
 
 }  // namespace dimmer::cook

@@ -4,7 +4,9 @@
 #include <dimmer/pack.h>
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -70,10 +72,17 @@ struct CookSettings {
 };
 Expected<CookSettings> readSettings(const std::string& settings_json);
 
+// The same for people: {"name": {"value": .., "from": ".."}, ...}. The text comes from a file: what is not of that
+// shape is left out, and what nests deeper is not even built.
+nlohmann::ordered_json listedSettings(const std::string& settings_json);
+
 // A shipped profile by name, or a file. A profile changes what it names of the one that it `extends` (a shipped one, or
 // a file beside it; "desktop" where it does not say). Unknown keys, wrong types and values out of range are errors that
 // name the key.
 Expected<Profile> loadProfile(const std::string& name_or_file);
 std::vector<std::string> shippedProfiles();
+
+// The files that a profile extends, one after another; shipped ones are none. Errors are for loadProfile() to tell.
+std::vector<std::filesystem::path> filesExtendedBy(const std::string& name_or_file);
 
 }  // namespace dimmer::cook

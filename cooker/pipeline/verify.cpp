@@ -157,11 +157,17 @@ Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
                                                  scene.file));
 }
 
+// What dissect() would refuse, before anything is measured.
+Expected<void> checkDissection(const Scene& scene, const Pack& pack, const VerifyOptions& options,
+                               const ReferenceState& state) {
+    if (options.causes && std::ranges::find(state.door_open, true) != state.door_open.end())
+        return fail(ErrorCode::InvalidArgument, "Causes of error are told apart with closed doors only.");
+    return options.causes || options.formats ? checkRebake(scene, pack) : Expected<void>();
+}
+
 Expected<void> dissect(const Scene& scene, const Pack& pack, const VerifyOptions& options, const ReferenceState& state,
                        Progress& progress, VerifyReport& report) {
     if (options.causes) {
-        if (std::ranges::find(state.door_open, true) != state.door_open.end())
-            return fail(ErrorCode::InvalidArgument, "Causes of error are told apart with closed doors only.");
         const auto causes =
             errorCauses(scene, pack, report.points, report.surface_pairs, state, report.floor_lux, progress);
         if (!causes) return std::unexpected(causes.error());
@@ -283,7 +289,8 @@ Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::s
     const ReferenceTracer tracer(rays, alone);
     const auto where = queries(points, false);
     std::vector<ReferenceEstimate> estimates(points.size());
-    refineAll(tracer, where, {.paths_min = set_paths_first, .paths_max = set_paths_first}, estimates, progress);
+    const uint32_t first = std::min(set_paths_first, paths_max);
+    refineAll(tracer, where, {.paths_min = first, .paths_max = first}, estimates, progress);
     // How bright it is where the set shines: the mean weighted by the light itself.
     double sum = 0, squares = 0;
     for (const LightPair& p : pairsOf(*with, estimates)) {
@@ -293,8 +300,8 @@ Expected<EffectFigures> setEffect(const RayScene& rays, const Pack& pack, std::s
     const double typical_lux = sum > 0 ? squares / sum : 0;
     const double more = static_cast<double>(paths_max) / VerifyOptions{}.paths_max;
     refineAll(tracer, where,
-              {.paths_min = set_paths_first,
-               .paths_max = std::max(set_paths_first, paths_max / set_paths_share),
+              {.paths_min = first,
+               .paths_max = std::max(first, paths_max / set_paths_share),
                .relative = set_relative / std::sqrt(more),
                .floor_lux = typical_lux},
               estimates, progress);
@@ -305,6 +312,7 @@ Expected<VerifyReport> verify(const Scene& scene, const Pack& pack, const Verify
     if (auto ok = checkSameLevel(scene, pack); !ok) return std::unexpected(ok.error());
     const auto state = readReferenceState(scene, options.state);
     if (!state) return std::unexpected(state.error());
+    if (auto ok = checkDissection(scene, pack, options, *state); !ok) return std::unexpected(ok.error());
     const Scene as_it_stands = sceneInState(scene, *state);
     const RayScene rays(as_it_stands);
     VerifyReport report;

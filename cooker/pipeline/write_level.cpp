@@ -78,7 +78,9 @@ class LevelWriter {
         normaliseTextures();
         moveReferences(from, to);
         document_.json["asset"]["generator"] = "Dimmer";
-        return document_.bytes();
+        auto bytes = document_.bytes();
+        if (bytes) return bytes;
+        return fail(bytes.error().code, fmt::format("{}: {}", to.string(), bytes.error().message));
     }
 
    private:

@@ -71,6 +71,12 @@ std::vector<std::vector<ProbeTermLight>> fitTerms(const Series& series, const Mo
     return rows;
 }
 
+// All over the model's surface; none where its probes are not fitted to it.
+std::vector<ModelPlace> placesOf(const RayScene& rays, uint32_t model, size_t probes) {
+    if (probes > fitted_probes_max) return {};
+    return modelPlaces(rays, model, places_per_probe * static_cast<uint32_t>(probes));
+}
+
 class LocalBake {
    public:
     LocalBake(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
@@ -126,31 +132,11 @@ class LocalBake {
     }
     uint64_t rays() const { return rays_; }
 
-    void warn(std::vector<std::string>& warnings) const {
-        const auto& source = gatherer_.models().places().source;
-        for (size_t m = 0; m < model_.size(); ++m) {
-            const std::string& node = gatherer_.rays().scene().models[model_[m]].node;
-            const size_t probes = first_probe_[m + 1] - first_probe_[m];
-            const bool has_places = first_place_[m + 1] > first_place_[m];
-            if (!has_places && std::ranges::all_of(std::span(source).subspan(first_probe_[m], probes),
-                                                   [](uint32_t s) { return s == no_index; }))
-                warnings.push_back(
-                    fmt::format("node '{}': stands inside of other geometry; its light grid is black", node));
-            if (probes > fitted_probes_max)
-                warnings.push_back(
-                    fmt::format("node '{}': of its {} probes none is fitted to its surface, which is done "
-                                "for up to {}; mend: a larger dimmer_grid_spacing, or parts",
-                                node, probes, fitted_probes_max));
-        }
-    }
-
    private:
     void findPlaces() {
         std::vector<std::vector<ModelPlace>> of_model(model_.size());
         tbb::parallel_for(size_t{0}, model_.size(), [&](size_t m) {
-            const size_t probes = first_probe_[m + 1] - first_probe_[m];
-            if (probes > fitted_probes_max) return;
-            of_model[m] = modelPlaces(gatherer_.rays(), model_[m], places_per_probe * static_cast<uint32_t>(probes));
+            of_model[m] = placesOf(gatherer_.rays(), model_[m], first_probe_[m + 1] - first_probe_[m]);
         });
         for (const auto& places : of_model) {
             first_place_.push_back(places_.size());
@@ -188,18 +174,40 @@ class LocalBake {
 }  // namespace
 
 Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                      std::span<const uint8_t> groups, Progress& progress, uint64_t& rays,
-                                      std::vector<std::string>& warnings) {
+                                      std::span<const uint8_t> groups, Progress& progress, uint64_t& rays) {
     std::vector<std::vector<ProbeTermLight>> rows;
     if (!gatherer.models().empty()) {
         LocalBake bake(gatherer, series, settings, groups, progress);
         rows = bake.run();
         rays += bake.rays();
-        bake.warn(warnings);
     }
     return Sparse<ProbeTermLight>::build(rows.size(), [&](size_t begin, size_t end, auto emit) {
         for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[i]));
     });
+}
+
+std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ModelReceivers& models) {
+    std::vector<std::string> warnings;
+    const Scene& scene = rays.scene();
+    const auto& source = models.places().source;
+    size_t first = 0;
+    for (uint32_t m = 0; m < scene.models.size(); ++m) {
+        const SceneModel& model = scene.models[m];
+        if (model.moves) continue;
+        const size_t probes = size_t{model.probes.x} * model.probes.y * model.probes.z;
+        const bool all_inside =
+            std::ranges::all_of(std::span(source).subspan(first, probes), [](uint32_t s) { return s == no_index; });
+        first += probes;
+        if (all_inside && placesOf(rays, m, probes).empty())
+            warnings.push_back(
+                fmt::format("node '{}': stands inside of other geometry; its light grid is black", model.node));
+        if (probes > fitted_probes_max)
+            warnings.push_back(
+                fmt::format("node '{}': of its {} probes none is fitted to its surface, which is done for up to {}; "
+                            "mend: a larger dimmer_grid_spacing, or parts",
+                            model.node, probes, fitted_probes_max));
+    }
+    return warnings;
 }
 
 }  // namespace dimmer::cook

@@ -13,7 +13,7 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float coarse_spacing_m = 4;  // of the first probes
+constexpr float coarse_spacing_m = 4;  // of the first probes, where they may be as near as that
 constexpr float sparse_spacing = 2;    // outside of play areas
 // Of the number of probes in a round, at most: where there are few, each counts.
 constexpr double growth_of_few = 0.3, growth_of_many = 0.45;
@@ -47,7 +47,7 @@ class Placer {
           order_(siteOrder(choice.blocks)),
           trial_(rays, choice, states, settings),
           places_(trial_.places()),
-          near_(coarse_spacing_m) {}
+          near_(cellSide()) {}
 
     Expected<Placement> run() {
         settings_.uniform ? placeLattice() : placeCoarse();
@@ -108,12 +108,12 @@ class Placer {
     void thinOut() {
         const std::vector<uint32_t> order = leastUsefulFirst();
         const auto leave = order.begin() + static_cast<std::ptrdiff_t>(order.size() / exchange_part);
-        Neighbourhood staying(coarse_spacing_m);
+        Neighbourhood staying(cellSide());
         for (auto i = leave; i != order.end(); ++i) staying.add(places_[probes_.places[*i]]);
         std::vector<uint32_t> kept(leave, order.end());
         for (auto i = leave; i != order.begin();) {
             const glm::vec3 p = places_[probes_.places[*--i]];
-            if (staying.anySeen(rays_, p, coarse_spacing_m)) continue;
+            if (staying.anySeen(rays_, p, coarseSpacingAt(p))) continue;
             staying.add(p);
             kept.push_back(*i);
         }
@@ -136,7 +136,7 @@ class Placer {
 
     void take(ChosenProbes probes) {
         probes_ = std::move(probes);
-        near_ = Neighbourhood(coarse_spacing_m);
+        near_ = Neighbourhood(cellSide());
         for (const uint32_t i : probes_.places) near_.add(places_[i]);
     }
 
@@ -194,13 +194,13 @@ class Placer {
 
     // Not so near to another one that they see, and not where that leaves somewhere without any in sight.
     bool moveTo(uint32_t probe, uint32_t place) {
-        Neighbourhood others(coarse_spacing_m);
+        Neighbourhood others(cellSide());
         for (uint32_t i = 0; i < probes_.places.size(); ++i)
             if (i != probe) others.add(places_[probes_.places[i]]);
         const glm::vec3 to = places_[place], from = places_[probes_.places[probe]];
         if (others.anySeen(rays_, to, spacingAt(to))) return false;
         others.add(to);
-        if (!others.anySeen(rays_, from, coarse_spacing_m)) return false;
+        if (!others.anySeen(rays_, from, coarseSpacingAt(from))) return false;
         probes_.places[probe] = place;
         return true;
     }
@@ -210,6 +210,12 @@ class Placer {
         const bool play = areas.empty() || std::ranges::any_of(areas, [&](const auto& a) { return a.contains(p); });
         return settings_.min_spacing_m * (play ? 1 : sparse_spacing);
     }
+
+    // Between the first probes. So near to any place, some probe is in sight.
+    float coarseSpacingAt(glm::vec3 p) const { return std::max(coarse_spacing_m, spacingAt(p)); }
+
+    // No distance that is asked for is longer.
+    float cellSide() const { return std::max(coarse_spacing_m, sparse_spacing * settings_.min_spacing_m); }
 
     bool add(uint32_t place, float spacing_m) {
         const glm::vec3 p = places_[place];
@@ -226,7 +232,7 @@ class Placer {
         std::iota(by_block.begin(), by_block.end(), 0u);
         std::ranges::stable_sort(by_block, {}, [&](uint32_t i) { return order_[i].block; });
         for (const uint32_t i : by_block)
-            if (probes_.places.size() < limit_) add(i, coarse_spacing_m);
+            if (probes_.places.size() < limit_) add(i, coarseSpacingAt(places_[i]));
     }
 
     // The sites nearest to the points of a lattice, as many points as probes may be: as even as sites are.

@@ -126,7 +126,9 @@ void fillStarts(const Box& box, GlobalGrid& grid) {
         start.max_m[i] = box.max_m[axis];
         start.counts[i] = static_cast<uint32_t>(std::clamp(std::floor(size[axis] / side), 1.0, wanted));
     }
-    // Found by walks of their own, each from where the one before ended; until all are there, all begin at 0.
+    // Found by walks of their own, each from where the one before ended; until all are there, all begin at 0. From
+    // there a row of cells may begin a kilometre away, which no walk is cut short for.
+    const auto steps_max = static_cast<uint32_t>(grid.tetrahedra.size());
     const auto [nx, ny, nz] = start.counts;
     std::vector<uint32_t> starts;
     grid.starts.assign(size_t{nx} * ny * nz, 0);
@@ -134,7 +136,7 @@ void fillStarts(const Box& box, GlobalGrid& grid) {
     for (uint32_t cell = 0; cell < grid.starts.size(); ++cell) {
         const glm::dvec3 at = (glm::dvec3(cell % nx, cell / nx % ny, cell / nx / ny) + 0.5) / glm::dvec3(nx, ny, nz);
         const glm::vec3 centre = glm::dvec3(box.min_m) + at * size;
-        hint = locate(grid, {centre.x, centre.y, centre.z}, hint).tetrahedron;
+        hint = locate(grid, {centre.x, centre.y, centre.z}, hint, steps_max).tetrahedron;
         starts.push_back(hint);
     }
     grid.starts = std::move(starts);

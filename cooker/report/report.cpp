@@ -3,6 +3,7 @@
 #include <pack/pack_data.h>
 #include <pipeline/budget.h>
 #include <pipeline/contribution_text.h>
+#include <pipeline/heat_map.h>
 #include <pipeline/profile.h>
 #include <report/page_pictures.h>
 
@@ -269,7 +270,7 @@ class Report {
         if (input_.heat_maps.empty()) return {};
         body_ += "<h2>Error on the pages</h2>\n<p class=dim>Points: blue too dark, white exact, red too bright.</p>\n";
         for (uint32_t page = 0; page < d_.page_count; ++page) {
-            const auto file = input_.heat_maps / fmt::format("page_{}.png", page);
+            const auto file = input_.heat_maps / heatMapName(page);
             std::ifstream in(file, std::ios::binary);
             const std::string png{std::istreambuf_iterator<char>(in), {}};
             if (!in || !png.starts_with("\x89PNG"))
@@ -307,13 +308,12 @@ class Report {
     }
 
     void settings() {
-        const auto all = nlohmann::ordered_json::parse(d_.settings_json, nullptr, false);
-        if (!all.is_object()) return;
+        const auto all = listedSettings(d_.settings_json);
+        if (all.empty()) return;
         body_ += "<details><summary>Settings</summary><div class=scroll><table><tr><th>name<th>value<th>from\n";
         for (const auto& [name, setting] : all.items())
-            if (setting.is_object() && setting.contains("value") && setting.contains("from"))
-                body_ += fmt::format("<tr><td>{}<td>{}<td>{}\n", escaped(name), escaped(setting["value"].dump()),
-                                     escaped(setting["from"].dump()));
+            body_ += fmt::format("<tr><td>{}<td>{}<td>{}\n", escaped(name), escaped(setting["value"].dump()),
+                                 escaped(setting["from"].dump()));
         body_ += "</table></div></details>\n";
     }
 

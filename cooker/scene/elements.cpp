@@ -6,15 +6,12 @@
 
 namespace dimmer::cook {
 
-Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras, const std::string& owner) {
+Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
     const auto name = extras.text("dimmer_light_set");
     if (!name) return std::unexpected(name.error());
     const auto stated = extras.positive("dimmer_max_weight");
     if (!stated) return std::unexpected(stated.error());
-    if (!*name) {
-        if (*stated) context_.warn(owner, "'dimmer_max_weight' without 'dimmer_light_set' was ignored.");
-        return std::nullopt;
-    }
+    if (!*name) return std::nullopt;
     const auto ok = checkElementName(context_, **name, "dimmer_light_set", extras.ownerOf("dimmer_light_set"));
     if (!ok) return std::unexpected(ok.error());
     const auto max_weight = static_cast<float>(stated->value_or(1.0));

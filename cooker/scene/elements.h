@@ -14,8 +14,8 @@ class Elements {
    public:
     explicit Elements(ImportContext& context) : context_(context) {}
 
-    // The light set that the extras name and its maximum weight; empty when they name none.
-    Expected<std::optional<uint32_t>> lightSet(const Extras& extras, const std::string& owner);
+    // The light set that the extras name, which takes note of their maximum weight; empty when they name none.
+    Expected<std::optional<uint32_t>> lightSet(const Extras& extras);
 
     // The door that the extras name; empty when they name none.
     Expected<std::optional<uint32_t>> door(const Extras& extras, const std::string& owner);

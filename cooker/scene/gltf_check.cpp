@@ -12,6 +12,29 @@ constexpr std::array<std::string_view, 6> known_extensions = {
     "KHR_materials_specular", "KHR_mesh_quantization", "KHR_texture_transform"};
 constexpr const char* lights_extension = "KHR_lights_punctual";
 
+// Gloss, notes, and other ways to data that a file which does not require them has in the usual way too.
+constexpr std::array<std::string_view, 16> harmless_extensions = {
+    "EXT_meshopt_compression",   "EXT_texture_webp",
+    "KHR_animation_pointer",     "KHR_draco_mesh_compression",
+    "KHR_materials_anisotropy",  "KHR_materials_clearcoat",
+    "KHR_materials_dispersion",  "KHR_materials_ior",
+    "KHR_materials_iridescence", "KHR_materials_sheen",
+    "KHR_materials_variants",    "KHR_materials_volume",
+    "KHR_texture_basisu",        "KHR_xmp",
+    "KHR_xmp_json_ld",           "MSFT_texture_dds"};
+
+struct IgnoredExtension {
+    std::string_view name, loss;
+};
+constexpr std::array<IgnoredExtension, 3> lossy_extensions = {
+    {{"EXT_mesh_gpu_instancing",
+      "each node that has it stands there once, by its own transform. Export its instances as nodes."},
+     {"KHR_materials_pbrSpecularGlossiness",
+      "a material without metallic-roughness values besides is white metal. Convert the materials to "
+      "metallic-roughness."},
+     {"KHR_materials_transmission",
+      "what lets light through by it alone is opaque. Give such glass alphaMode BLEND and an alpha below 1."}}};
+
 class Checker {
    public:
     explicit Checker(const ImportContext& context) : context_(context), model_(context.model) {}
@@ -190,6 +213,19 @@ class Checker {
 
 Expected<void> checkModel(const ImportContext& context) {
     return Checker(context).run();
+}
+
+void warnOfExtensions(ImportContext& context) {
+    for (const std::string& name : context.model.extensionsUsed) {
+        if (std::ranges::count(known_extensions, name) > 0 || std::ranges::count(harmless_extensions, name) > 0)
+            continue;
+        const auto lossy = std::ranges::find(lossy_extensions, name, &IgnoredExtension::name);
+        context.warn("extensionsUsed",
+                     fmt::format("'{}' is ignored: {}", name,
+                                 lossy != lossy_extensions.end()
+                                     ? lossy->loss
+                                     : "what it adds is missing from the bake. Export the level without it."));
+    }
 }
 
 std::optional<int> lightOf(const tinygltf::Node& node) {

@@ -9,6 +9,9 @@ namespace dimmer::cook {
 // ancestor, and every required extension is known. Accessors are checked where they are read (accessor.h).
 Expected<void> checkModel(const ImportContext& context);
 
+// Warns of extensions that are used, and ignored at a loss.
+void warnOfExtensions(ImportContext& context);
+
 // The light that a node refers to; empty when none. Valid after checkModel.
 std::optional<int> lightOf(const tinygltf::Node& node);
 

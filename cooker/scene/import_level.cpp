@@ -38,6 +38,7 @@ class LevelImporter {
    private:
     Expected<void> prepare() {
         if (const auto ok = checkModel(context_); !ok) return ok;
+        warnOfExtensions(context_);
         auto mappings = importMaterials(context_);
         if (!mappings) return std::unexpected(mappings.error());
         meshes_.emplace(context_, std::move(*mappings));
@@ -80,7 +81,7 @@ class LevelImporter {
         const bool has_content = node.mesh >= 0 || shines || node.camera >= 0 || node.name == player_start;
         if (has_content && at.singular != -1) return singular(at, owner);
 
-        const Extras extras = extrasOf(at, light);
+        const Extras of_light = extrasOf(at, light), extras = withMaterials(of_light, node.mesh);
         if (const auto ok = door(at, extras, owner); !ok) return ok;
         const auto play_area = extras.flag("dimmer_play_area");
         if (!play_area) return std::unexpected(play_area.error());
@@ -88,12 +89,13 @@ class LevelImporter {
         if (*play_area)
             if (const auto ok = playArea(at); !ok) return ok;
 
+        const bool bakes_light = shines && of_light.has("dimmer_bake");
         if (node.mesh >= 0 || shines)
-            if (const auto ok = warnOfMisplaced(extras, owner, node.mesh >= 0, shines); !ok) return ok;
+            if (const auto ok = warnOfMisplaced(extras, owner, node.mesh >= 0, bakes_light); !ok) return ok;
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
         if (shines)
-            if (const auto ok = this->light(at, light, extras, owner); !ok) return ok;
+            if (const auto ok = this->light(at, light, of_light); !ok) return ok;
         if (node.mesh < 0 && !shines)
             if (const auto ok = withoutMeshOrLight(at, extras, owner); !ok) return ok;
         if (node.camera >= 0 || node.name == player_start) return viewpoint(at);
@@ -139,6 +141,7 @@ class LevelImporter {
                                   model_.nodes[static_cast<size_t>(parent)].name + "_Orientation";
     }
 
+    // Without its materials', which do not speak for a light.
     Extras extrasOf(const PlacedNode& at, std::optional<int> light) const {
         const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
         Extras extras(context_);
@@ -148,26 +151,32 @@ class LevelImporter {
         if (node.mesh >= 0)
             extras.add(model_.meshes[static_cast<size_t>(node.mesh)].extras, context_.meshLabel(node.mesh));
         if (light) extras.add(model_.lights[static_cast<size_t>(*light)].extras, context_.lightLabel(*light));
-        if (node.mesh >= 0)
-            for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<size_t>(node.mesh)].primitives)
-                if (primitive.material >= 0)
-                    extras.add(model_.materials[static_cast<size_t>(primitive.material)].extras,
-                               context_.materialLabel(primitive.material));
         return extras;
     }
 
-    // A node belongs to the nearest door at or above it.
+    Extras withMaterials(Extras extras, int mesh) const {
+        if (mesh >= 0)
+            for (const tinygltf::Primitive& primitive : model_.meshes[static_cast<size_t>(mesh)].primitives)
+                addMaterial(extras, primitive.material);
+        return extras;
+    }
+
+    void addMaterial(Extras& extras, int material) const {
+        if (material >= 0)
+            extras.add(model_.materials[static_cast<size_t>(material)].extras, context_.materialLabel(material));
+    }
+
+    // A node belongs to the nearest door at or above it, and moves with all that is above it of that door.
     Expected<void> door(const PlacedNode& at, const Extras& extras, const std::string& owner) {
         const auto own = elements_.door(extras, owner);
         if (!own) return std::unexpected(own.error());
         DoorPart& part = door_of_node_[static_cast<size_t>(at.node)];
-        if (!*own) {
-            if (at.parent >= 0) part = door_of_node_[static_cast<size_t>(at.parent)];
-            return {};
-        }
+        if (at.parent >= 0) part = door_of_node_[static_cast<size_t>(at.parent)];
+        if (!*own) return {};
         const auto pose = elements_.openPose(extras, owner, **own);
         if (!pose) return std::unexpected(pose.error());
-        part = {*own, at.singular == -1 ? inWorld(*pose, at.world_from_node) : glm::dmat4(1)};
+        const glm::dmat4 moved = at.singular == -1 ? inWorld(*pose, at.world_from_node) : glm::dmat4(1);
+        part = {*own, part.door == *own ? part.open_from_closed * moved : moved};
         return {};
     }
 
@@ -217,6 +226,8 @@ class LevelImporter {
     // material, those of that material.
     struct EmissionGroup {
         std::optional<uint32_t> light_set;
+        std::string named_by;
+        bool by_material = false;  // then not a light's of the same node
         std::vector<size_t> primitives;
     };
 
@@ -226,22 +237,18 @@ class LevelImporter {
         Extras shared(context_);
         shared.add(model_.nodes[static_cast<size_t>(at.node)].extras, owner);
         shared.add(mesh.extras, context_.meshLabel(mesh_index));
-        const auto shared_set = elements_.lightSet(shared, owner);
-        if (!shared_set) return std::unexpected(shared_set.error());
 
         std::vector<EmissionGroup> groups;
         for (size_t i = 0; i < mesh.primitives.size(); ++i) {
-            std::optional<uint32_t> set = *shared_set;
-            if (const int material = mesh.primitives[i].material; !set && material >= 0) {
-                Extras of_material(context_);
-                of_material.add(model_.materials[static_cast<size_t>(material)].extras,
-                                context_.materialLabel(material));
-                const auto own = elements_.lightSet(of_material, context_.materialLabel(material));
-                if (!own) return std::unexpected(own.error());
-                set = *own;
+            Extras extras = shared;
+            addMaterial(extras, mesh.primitives[i].material);
+            const auto set = elements_.lightSet(extras);
+            if (!set) return std::unexpected(set.error());
+            auto group = std::ranges::find(groups, *set, &EmissionGroup::light_set);
+            if (group == groups.end()) {
+                const std::string named_by = *set ? extras.ownerOf("dimmer_light_set") : "";
+                group = groups.insert(groups.end(), {*set, named_by, !shared.has("dimmer_light_set"), {}});
             }
-            auto group = std::ranges::find(groups, set, &EmissionGroup::light_set);
-            if (group == groups.end()) group = groups.insert(groups.end(), EmissionGroup{set, {}});
             group->primitives.push_back(i);
         }
         return groups;
@@ -253,28 +260,44 @@ class LevelImporter {
     }
 
     // What a key says of things that the node has not.
-    Expected<void> warnOfMisplaced(const Extras& extras, const std::string& owner, bool is_mesh, bool is_light) {
+    Expected<void> warnOfMisplaced(const Extras& extras, const std::string& owner, bool is_mesh, bool bakes_light) {
         const auto bake = extras.choice("dimmer_bake", bake_modes);
         if (!bake) return std::unexpected(bake.error());
-        if (*bake && !is_light)
+        if (*bake && !bakes_light)
             context_.warn(owner, "'dimmer_bake' is for lights and was ignored; what shines is baked whole.");
+        if (extras.has("dimmer_max_weight") && !extras.has("dimmer_light_set"))
+            context_.warn(owner, "'dimmer_max_weight' without 'dimmer_light_set' was ignored.");
         for (const char* key : {"dimmer_texel_density", "dimmer_grid_spacing"})
             if (extras.raw(key) != nullptr && !is_mesh)
                 context_.warn(owner, fmt::format("'{}' is for meshes and was ignored.", key));
         return {};
     }
 
+    // What joints or shape keys would move stands here as its vertices and its node say. What is dynamic may move.
+    void warnOfDeformation(const tinygltf::Node& node, const std::string& owner) {
+        if (node.skin >= 0)
+            context_.warn(owner,
+                          "is skinned, but was placed by its own transform, not by its joints. Apply the armature "
+                          "before exporting.");
+        const auto& weights =
+            node.weights.empty() ? model_.meshes[static_cast<size_t>(node.mesh)].weights : node.weights;
+        if (std::ranges::any_of(weights, [](double weight) { return weight != 0; }))
+            context_.warn(owner, "has morph targets that were ignored. Apply the shape keys before exporting.");
+    }
+
     Expected<void> mesh(const PlacedNode& at, const Extras& extras, const std::string& owner) {
+        const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
         const auto settings = meshSettings(extras, owner);
         if (!settings) return std::unexpected(settings.error());
+        if (settings->lighting != Lighting::Dynamic) warnOfDeformation(node, owner);
         const auto groups = emissionGroups(at, owner);
         if (!groups) return std::unexpected(groups.error());
         bool any = false;
         for (const EmissionGroup& group : *groups) {
             Expected<SceneMesh> mesh = meshes_->import(at.node, group.primitives, at.world_from_node);
             if (!mesh) return std::unexpected(mesh.error());
-            if (group.light_set && !isEmissiveMesh(*mesh) && !isLight(model_.nodes[static_cast<size_t>(at.node)]))
-                return withoutLight(extras, owner);
+            if (group.light_set && !isEmissiveMesh(*mesh) && (group.by_material || !isLight(node)))
+                return withoutLight(owner, scene_.light_sets[*group.light_set].name, group.named_by);
             if (mesh->triangles.empty()) continue;
             any = true;
             place(at, *settings, group.light_set, std::move(*mesh));
@@ -308,18 +331,16 @@ class LevelImporter {
         return name.empty() ? fmt::format("node_{}", index) : name;
     }
 
-    std::unexpected<Error> withoutLight(const Extras& extras, const std::string& owner) const {
-        const std::string& stated_by = extras.ownerOf("dimmer_light_set");
+    std::unexpected<Error> withoutLight(const std::string& owner, const std::string& set,
+                                        const std::string& stated_by) const {
         return context_.error(owner,
                               fmt::format("is in the light set '{}'{}, but has neither a light nor an emissive mesh. "
                                           "Remove 'dimmer_light_set', or give its material emission.",
-                                          extras.raw("dimmer_light_set")->Get<std::string>(),
-                                          stated_by == owner ? "" : fmt::format(" (by {})", stated_by)));
+                                          set, stated_by == owner ? "" : fmt::format(" (by {})", stated_by)));
     }
 
     // A node with a profile may carry a punctual light besides, for programs that do not read profiles.
-    Expected<void> light(const PlacedNode& at, std::optional<int> punctual, const Extras& extras,
-                         const std::string& owner) {
+    Expected<void> light(const PlacedNode& at, std::optional<int> punctual, const Extras& extras) {
         const bool profile = hasLightProfile(model_.nodes[static_cast<size_t>(at.node)]);
         Expected<PunctualLight> light = profile ? profiles_.place(at.node, at.world_from_node)
                                                 : importLight(context_, *punctual, at.node, at.world_from_node);
@@ -329,7 +350,7 @@ class LevelImporter {
         if (!bake) return std::unexpected(bake.error());
         constexpr BakeMode of_choice[] = {BakeMode::Indirect, BakeMode::Full, BakeMode::None};
         if (*bake) light->bake = of_choice[**bake];
-        const auto set = elements_.lightSet(extras, owner);
+        const auto set = elements_.lightSet(extras);
         if (!set) return std::unexpected(set.error());
         light->light_set = *set;
         scene_.lights.push_back(std::move(*light));
@@ -343,7 +364,7 @@ class LevelImporter {
         });
         const auto set = extras.text("dimmer_light_set");
         if (!set) return std::unexpected(set.error());
-        if (*set && !carries_light) return withoutLight(extras, owner);
+        if (*set && !carries_light) return withoutLight(owner, **set, extras.ownerOf("dimmer_light_set"));
         const auto dynamic = lighting(extras, owner);
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};

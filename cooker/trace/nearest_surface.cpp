@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 namespace dimmer::cook {
 namespace {
@@ -109,6 +110,10 @@ NearestSurface::NearestSurface(std::span<const Mesh> meshes, uint32_t page_width
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), impl_->triangles.size() * 3));
     auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
                                                                    3 * sizeof(unsigned), impl_->triangles.size()));
+    if (!positions || !indices) {
+        rtcReleaseGeometry(geometry);
+        throw std::bad_alloc();
+    }
     for (size_t t = 0; t < impl_->triangles.size(); ++t)
         for (size_t i = 0; i < 3; ++i) {
             const glm::vec3 p = impl_->position(impl_->triangles[t], i);
@@ -119,6 +124,7 @@ NearestSurface::NearestSurface(std::span<const Mesh> meshes, uint32_t page_width
     rtcAttachGeometryByID(impl_->scene, geometry, 0);
     rtcReleaseGeometry(geometry);
     rtcCommitScene(impl_->scene);
+    if (rtcGetDeviceError(impl_->device) != RTC_ERROR_NONE) throw std::bad_alloc();
 }
 
 NearestSurface::~NearestSurface() = default;

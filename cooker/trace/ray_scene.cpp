@@ -6,7 +6,10 @@
 
 #include <algorithm>
 #include <limits>
+#include <memory>
+#include <new>
 #include <tuple>
+#include <type_traits>
 
 namespace dimmer::cook {
 namespace {
@@ -20,6 +23,10 @@ constexpr unsigned mask_leaves = 1 << opaque_leaf | 1 << transparent_leaf;
 constexpr float step_past_m = 1e-4f;
 // A ray that passes more surfaces than this is taken to be stopped; real levels stack a handful.
 constexpr int transparent_layers_max = 64;
+// A ray that passes a model which is not there may meet many of its surfaces.
+constexpr int hits_max = 1024;
+// Whether a ray passes is drawn apart from where it goes.
+constexpr uint32_t transparency_seed = 0x3f84d5b5u;
 
 // What a ray carries along: where it leaves the leaves that it meets.
 struct Collector {
@@ -52,8 +59,16 @@ void collect(const RTCFilterFunctionNArguments* args) {
 }  // namespace
 
 struct RayScene::Embree {
-    RTCDevice device = rtcNewDevice(nullptr);
-    RTCScene scene = rtcNewScene(device);
+    struct Release {
+        void operator()(RTCDevice d) const { rtcReleaseDevice(d); }
+        void operator()(RTCScene s) const { rtcReleaseScene(s); }
+    };
+    template <class Object>
+    using Handle = std::unique_ptr<std::remove_pointer_t<Object>, Release>;
+
+    Handle<RTCDevice> device{rtcNewDevice(nullptr)};
+    Handle<RTCScene> scene_owner{rtcNewScene(device.get())};
+    RTCScene scene = scene_owner.get();
     std::array<std::vector<uint32_t>, kinds> triangle_of;  // Embree primitive -> level triangle
 
     Embree(const RayScene& level, Surfaces surfaces) {
@@ -70,24 +85,24 @@ struct RayScene::Embree {
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
         rtcCommitScene(scene);
+        // Without memory a scene is empty, and would be all sky.
+        if (rtcGetDeviceError(device.get()) != RTC_ERROR_NONE) throw std::bad_alloc();
     }
-    ~Embree() {
-        rtcReleaseScene(scene);
-        rtcReleaseDevice(device);
-    }
-    Embree(const Embree&) = delete;
-    Embree& operator=(const Embree&) = delete;
 
     bool anyTransparent() const { return !triangle_of[transparent].empty(); }
 
     void attach(unsigned kind, const RayScene& level) {
         const auto& list = triangle_of[kind];
         if (list.empty()) return;
-        RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
         auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
             geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), list.size() * 3));
         auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
             geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), list.size()));
+        if (!positions || !indices) {
+            rtcReleaseGeometry(geometry);
+            throw std::bad_alloc();
+        }
         for (size_t t = 0; t < list.size(); ++t)
             for (int i = 0; i < 3; ++i) {
                 const glm::vec3 p = level.corner(list[t], i);
@@ -224,42 +239,65 @@ float RayScene::alphaAt(uint32_t triangle, float u, float v) const {
 std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
                                      Surfaces surfaces, uint32_t ignored, LeafHits* leaves) const {
     const Embree& among = embree(surfaces);
+    RTCRayHit r;
     std::optional<Hit> found;
-    float near_m = 0;
-    for (int layer = 0; layer < transparent_layers_max; ++layer) {
-        RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_max_m, mask_opaque | mask_transparent, leaves))
-            break;
-        const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
-        const Hit hit{.triangle = triangle,
-                      .distance_m = r.ray.tfar,
-                      .u = r.hit.u,
-                      .v = r.hit.v,
-                      .back = glm::dot(direction, triangles_[triangle].normal) > 0};
-        const bool there = ignored == no_model || triangles_[triangle].model != ignored;
-        const auto stops = [&] {
-            return r.hit.geomID == opaque ||
-                   unitFloat(hash(seed + static_cast<uint32_t>(layer))) < alphaAt(triangle, hit.u, hit.v);
-        };
-        if (there && stops()) {
-            found = hit;
-            break;
-        }
-        near_m = r.ray.tfar + step_past_m;
+    if (among.intersect(r, origin, direction, 0, distance_max_m, mask_opaque | mask_transparent, leaves)) {
+        found = hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, direction);
+        if (r.hit.geomID != opaque || ignored != no_model)
+            found = throughLayers(among, {origin, direction, distance_max_m}, *found, seed, ignored, leaves);
     }
     if (leaves) finish(*leaves, direction, found ? found->distance_m : distance_max_m);
     return found;
 }
 
+Hit RayScene::hitOf(uint32_t triangle, float distance_m, float u, float v, glm::vec3 direction) const {
+    return {triangle, distance_m, u, v, glm::dot(direction, triangles_[triangle].normal) > 0};
+}
+
+// What lets a ray pass is stepped over; the wall behind it is asked for by itself, from where that is: decals lie
+// nearer to walls than a step.
+std::optional<Hit> RayScene::throughLayers(const Embree& among, const Way& way, Hit hit, uint32_t seed,
+                                           uint32_t ignored, LeafHits* leaves) const {
+    const auto next = [&](float near_m, float far_m, unsigned mask, LeafHits* into) -> std::optional<Hit> {
+        RTCRayHit r;
+        if (!among.intersect(r, way.origin, way.direction, near_m, far_m, mask, into)) return std::nullopt;
+        return hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, way.direction);
+    };
+    const auto isThere = [&](const Hit& h) { return ignored == no_model || triangles_[h.triangle].model != ignored; };
+    std::optional<Hit> wall;
+    bool knows_wall = false;
+    for (int hits = 0, layers = 0; hits < hits_max; ++hits) {
+        if (isThere(hit)) {
+            if (scene_.materials[triangles_[hit.triangle].material].alpha_mode == AlphaMode::Opaque) return hit;
+            if (++layers == transparent_layers_max) return hit;
+            const float chance = unitFloat(hash(seed ^ transparency_seed, static_cast<uint32_t>(layers)));
+            if (chance < alphaAt(hit.triangle, hit.u, hit.v)) return hit;
+            if (!knows_wall) {
+                wall = next(std::max(0.0f, hit.distance_m - step_past_m), way.length_m, mask_opaque, leaves);
+                knows_wall = !wall || isThere(*wall);  // else the ray comes by it again
+            }
+        }
+        const float near_m = hit.distance_m + step_past_m;
+        const auto behind = knows_wall ? next(near_m, wall ? wall->distance_m : way.length_m, mask_transparent, nullptr)
+                                       : next(near_m, way.length_m, mask_opaque | mask_transparent, leaves);
+        if (!behind) return knows_wall ? wall : std::nullopt;
+        hit = *behind;
+    }
+    return std::nullopt;
+}
+
 float RayScene::transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
                                      float distance_m, LeafHits* leaves) const {
     float passed = 1, near_m = 0;
-    for (int layer = 0; layer < transparent_layers_max && passed > 0; ++layer) {
+    for (int hits = 0, layers = 0; layers < transparent_layers_max && hits < hits_max && passed > 0; ++hits) {
         RTCRayHit r;
         if (!among.intersect(r, origin, direction, near_m, distance_m, mask_opaque | mask_transparent, leaves))
             return passed;
         const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
-        if (triangles_[triangle].model != model) passed *= 1 - alphaAt(triangle, r.hit.u, r.hit.v);
+        if (triangles_[triangle].model != model) {
+            passed *= 1 - alphaAt(triangle, r.hit.u, r.hit.v);
+            ++layers;
+        }
         near_m = r.ray.tfar + step_past_m;
     }
     return 0;
@@ -283,12 +321,12 @@ float RayScene::throughTransparent(const Embree& among, glm::vec3 origin, glm::v
     float passed = 1, near_m = 0;
     for (int layer = 0; layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) break;
+        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
         passed *= 1 - alphaAt(among.triangle_of[transparent][r.hit.primID], r.hit.u, r.hit.v);
         if (passed <= 0) return 0;
         near_m = r.ray.tfar + step_past_m;
     }
-    return passed;
+    return 0;
 }
 
 // Rays meet leaves in no order, and some behind what stopped them.

@@ -1,5 +1,7 @@
 #include <write/glb_document.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstring>
 
@@ -9,6 +11,7 @@ namespace {
 // glTF 2.0 specification: constants of "accessor" and "GLB File Format".
 constexpr int component_float = 5126, component_uint32 = 5125;
 constexpr int target_vertices = 34962, target_indices = 34963;
+constexpr uint64_t header_bytes = 12, chunk_header_bytes = 8;
 constexpr uint32_t glb_magic = 0x46546C67, glb_version = 2, chunk_json = 0x4E4F534A, chunk_binary = 0x004E4942;
 
 template <class T>
@@ -18,8 +21,12 @@ void append(std::vector<std::byte>& out, const T& value) {
     std::memcpy(out.data() + end, &value, sizeof(value));
 }
 
+uint64_t paddedSize(uint64_t bytes) {
+    return (bytes + 3) / 4 * 4;
+}
+
 void appendChunk(std::vector<std::byte>& out, uint32_t type, std::span<const std::byte> bytes, char padding) {
-    const size_t padded = (bytes.size() + 3) / 4 * 4;
+    const size_t padded = paddedSize(bytes.size());
     append(out, static_cast<uint32_t>(padded));
     append(out, type);
     out.insert(out.end(), bytes.begin(), bytes.end());
@@ -64,7 +71,7 @@ size_t GlbDocument::addIndices(std::span<const uint32_t> values) {
     return json["accessors"].size() - 1;
 }
 
-std::vector<std::byte> GlbDocument::bytes() {
+Expected<std::vector<std::byte>> GlbDocument::bytes(uint64_t bytes_max) {
     json["buffers"] = Json::array();
     if (!buffer_.empty()) json["buffers"].push_back({{"byteLength", buffer_.size()}});
     std::vector<std::string> empty;
@@ -72,6 +79,12 @@ std::vector<std::byte> GlbDocument::bytes() {
         if (value.is_array() && value.empty()) empty.push_back(key);
     for (const std::string& key : empty) json.erase(key);
     const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+    const uint64_t whole = header_bytes + chunk_header_bytes + paddedSize(text.size()) +
+                           (buffer_.empty() ? 0 : chunk_header_bytes + paddedSize(buffer_.size()));
+    if (whole > bytes_max)
+        return fail(ErrorCode::BadInput, fmt::format("it would have {} bytes, more than the {} of a GLB file; part the "
+                                                     "level, or make its images smaller",
+                                                     whole, bytes_max));
     std::vector<std::byte> file;
     append(file, glb_magic);
     append(file, glb_version);

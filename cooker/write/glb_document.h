@@ -1,6 +1,8 @@
 // A glTF document with one buffer, to be written as GLB.
 #pragma once
 
+#include <dimmer/error.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
@@ -24,8 +26,9 @@ class GlbDocument {
     // Corners of triangles.
     size_t addIndices(std::span<const uint32_t> values);
 
-    // The file. Arrays of the document that are empty are left out, as glTF wants it.
-    std::vector<std::byte> bytes();
+    // The file. Arrays of the document that are empty are left out, as glTF wants it. An error above `bytes_max`: the
+    // format counts in 32 bits.
+    Expected<std::vector<std::byte>> bytes(uint64_t bytes_max = UINT32_MAX);
 
    private:
     std::vector<std::byte> buffer_;

@@ -15,6 +15,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <new>
 #include <string_view>
 
 namespace dimmer::cook {
@@ -83,7 +84,9 @@ class Writer {
         for (size_t b = 0; b < record_bytes; ++b)
             for (size_t i = 0; i < count; ++i) shuffled[b * count + i] = bytes[i * record_bytes + b];
         std::vector<std::byte> stored(ZSTD_compressBound(shuffled.size()));
-        stored.resize(ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), zstd_level_));
+        const size_t size = ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), zstd_level_);
+        if (ZSTD_isError(size)) throw std::bad_alloc();  // with room for the result, memory is all that it can lack
+        stored.resize(size);
         return stored;
     }
 

@@ -48,7 +48,8 @@ Sample mix(const Sample& a, const Sample& b, float share_of_b) {
 std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> irradiance_pages,
                                     std::span<const uint32_t> direction_pages, uint32_t page, std::array<float, 2> uv,
                                     std::array<float, 3> normal_tangent) {
-    if (page >= pack.pageCount()) return {};
+    const size_t texels = pack.data().base_pages.size();
+    if (page >= pack.pageCount() || irradiance_pages.size() < texels || direction_pages.size() < texels) return {};
     const Tap x = tap(uv[0], pack.pageWidth()), y = tap(uv[1], pack.pageHeight());
     auto texel = [&](uint32_t tx, uint32_t ty) {
         const size_t i = (size_t{page} * pack.pageHeight() + ty) * pack.pageWidth() + tx;

@@ -1,5 +1,6 @@
 #include <cpu/worker_pool.h>
 
+#include <new>
 #include <system_error>
 
 namespace dimmer {
@@ -8,6 +9,7 @@ WorkerPool::WorkerPool(uint32_t threads) {
     try {
         for (uint32_t i = 1; i < threads; ++i) workers_.emplace_back([this, i] { loop(i); });
     } catch (const std::system_error&) {  // no more threads to be had
+    } catch (const std::bad_alloc&) {     // nor memory for one
     }
 }
 

@@ -105,12 +105,14 @@ Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    group_lanes_max_ =
+        std::min(properties.limits.maxComputeWorkGroupInvocations, properties.limits.maxComputeWorkGroupSize[0]);
     std::vector<Specialisation> pipelines;
     for (const Variant& variant : variants)
         for (const bool to_pages : {false, true})
             for (uint32_t loads = 1; loads <= loads_max; ++loads)
-                pipelines.push_back({std::min(variant.workgroup_size, properties.limits.maxComputeWorkGroupInvocations),
-                                     loads, variant.lane_stores, to_pages});
+                pipelines.push_back(
+                    {std::min(variant.workgroup_size, group_lanes_max_), loads, variant.lane_stores, to_pages});
     const KernelBinding bindings[] = {
         KernelBinding::ofTexels(source_.view.get()), KernelBinding::ofBuffer(target_.buffer.get()),
         KernelBinding::ofImage(pages_[0].view.get()), KernelBinding::ofImage(pages_[1].view.get())};
@@ -133,7 +135,8 @@ Expected<double> CopyRoof::runVariant(size_t variant, CopyTarget target, uint64_
         const Variant& v = variants[variant];
         kernel_->bind(commands, pipelineOf(variant, target, loads_each));
         kernel_->push(commands, Constants{first, count, units, page_width});
-        const uint32_t per_group = v.workgroup_size * v.lane_stores, groups = (count + per_group - 1) / per_group;
+        const uint32_t per_group = std::min(v.workgroup_size, group_lanes_max_) * v.lane_stores;
+        const uint32_t groups = (count + per_group - 1) / per_group;
         const uint32_t columns = std::min(groups, groups_x_max_);
         vkCmdDispatch(commands, columns, (groups + columns - 1) / columns, 1);
     };

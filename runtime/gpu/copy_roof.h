@@ -15,7 +15,8 @@ enum class CopyTarget { Buffer, Pages };
 
 class CopyRoof {
    public:
-    // For copies of up to so many bytes. Unsupported on queues without timestamps.
+    // For copies of up to so many bytes. Unsupported on queues without timestamps, and where the device cannot read as
+    // much as one buffer.
     static Expected<CopyRoof> create(const VulkanContext& vulkan, uint64_t read_bytes_max, uint64_t written_bytes_max);
 
     // Microseconds of one copy; blocking. The kernel is the fastest of several workgroup sizes and of one or four
@@ -39,7 +40,7 @@ class CopyRoof {
     Image pages_[2];
     std::optional<Kernel> kernel_;
     std::optional<size_t> best_[2];  // per target
-    uint32_t groups_x_max_ = 0;
+    uint32_t groups_x_max_ = 0, group_lanes_max_ = 0;
 };
 
 }  // namespace dimmer

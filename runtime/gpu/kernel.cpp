@@ -1,5 +1,6 @@
 #include <gpu/kernel.h>
 
+#include <fmt/format.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 #include <update/device_places.h>
@@ -15,6 +16,21 @@ constexpr std::array descriptor_types = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER
 
 VkDescriptorType typeOf(const KernelBinding& binding) {
     return descriptor_types[static_cast<size_t>(binding.kind)];
+}
+
+// Of those formats that tables have.
+VkDeviceSize texelBytes(VkFormat format) {
+    switch (format) {
+        case VK_FORMAT_R8G8_UINT:
+        case VK_FORMAT_R16_UINT:
+            return 2;
+        case VK_FORMAT_R32_UINT:
+            return 4;
+        case VK_FORMAT_R32G32_UINT:
+            return 8;
+        default:
+            return 16;
+    }
 }
 
 Expected<ShaderModuleHandle> createModule(VkDevice device, std::span<const uint32_t> spirv) {
@@ -148,6 +164,16 @@ void Kernel::bind(VkCommandBuffer commands, size_t pipeline, uint32_t set) const
 
 Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
                                         MemoryUse use) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkDeviceSize texels = size_bytes / texelBytes(format);
+    if (texels > properties.limits.maxTexelBufferElements)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("A table of {} texels exceeds what this Vulkan device reads as one buffer, {}. Cook with "
+                        "fewer texels per metre, wider grids or a higher activity threshold, or create the "
+                        "runtime with a smaller moving_probes_max.",
+                        texels, properties.limits.maxTexelBufferElements));
     TexelBuffer result;
     auto buffer = createBuffer(vulkan, std::max<VkDeviceSize>(size_bytes, texel_buffer_bytes_min),
                                VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, use);

@@ -59,7 +59,8 @@ struct TexelBuffer {
     GpuBuffer buffer;
     BufferViewHandle view;
 };
-// Of at least one texel: what nothing reads still needs a view to bind.
+// Of at least one texel: what nothing reads still needs a view to bind. Unsupported where they are more than the device
+// reads as one buffer.
 Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
                                         MemoryUse use);
 

@@ -69,7 +69,7 @@ std::span<const ModelMesh> Pack::modelMeshes() const {
     return data_->model_meshes;
 }
 ModelSlot Pack::localGridSlot(uint32_t local_grid) const {
-    return slotOf(data_->probes.local[local_grid]);
+    return local_grid < data_->probes.local.size() ? slotOf(data_->probes.local[local_grid]) : ModelSlot{};
 }
 uint32_t Pack::pageCount() const {
     return data_->page_count;

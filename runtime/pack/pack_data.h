@@ -106,5 +106,7 @@ struct PackData {
 // Checks everything that an executor relies on: every index in range, clusters and batches tile the receivers,
 // addresses inside the pages and unique, finite floats. Linear in the size of the data.
 Expected<void> validate(const PackData& data);
+// Its first check alone, for who is about to make pages: how many there are and how large, by the numbers that say so.
+Expected<void> validatePageSizes(const PackData& data);
 
 }  // namespace dimmer

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <utility>
 
@@ -64,9 +65,10 @@ class Reader {
         auto then = [&](auto&& step) {
             if (ok) ok = step();
         };
+        then([&] { return validatePageSizes(d); });
         then([&] { return table(ChunkType::Elements, [&](ByteReader& in) { readElements(in, d); }); });
         then([&] { return table(ChunkType::Contributions, [&](ByteReader& in) { readContributions(in, d); }); });
-        then([&] { return array(ChunkType::BasePages, d.base_pages); });
+        then([&] { return readBasePages(d); });
         then([&] { return readTexelTables(d); });
         then([&] { return array(ChunkType::Addresses, d.addresses); });
         then([&] { return readPayload(d); });
@@ -119,6 +121,18 @@ class Reader {
             if (known(c.type) && !by_name_.emplace(std::pair(c.type, c.subject), &c).second)
                 return bad("chunk {} stands there twice", name(c));
         }
+        return checkNoneOverlap();
+    }
+
+    // Of one frame that many chunks name, a small file could unfold without end.
+    Expected<void> checkNoneOverlap() const {
+        std::vector<const Chunk*> by_offset;
+        for (const Chunk& c : chunks_) by_offset.push_back(&c);
+        std::ranges::stable_sort(by_offset, {}, &Chunk::offset);
+        for (size_t i = 1; i < by_offset.size(); ++i) {
+            const Chunk &a = *by_offset[i - 1], &b = *by_offset[i];
+            if (b.offset - a.offset < a.stored_bytes) return bad("chunk {} and chunk {} share bytes", name(a), name(b));
+        }
         return {};
     }
 
@@ -154,6 +168,13 @@ class Reader {
                 return true;
         }
         return false;
+    }
+
+    // What the header and the tables know of a chunk's size, before it is decoded. One that is missing load() reports.
+    Expected<void> expectBytes(ChunkType type, uint32_t subject, uint64_t bytes) const {
+        const auto found = by_name_.find({static_cast<uint32_t>(type), subject});
+        if (found == by_name_.end() || found->second->real_bytes == bytes) return {};
+        return bad("chunk {} states {} bytes instead of {}", name(type, subject), found->second->real_bytes, bytes);
     }
 
     Expected<std::vector<std::byte>> load(ChunkType type, uint32_t subject) {
@@ -239,13 +260,20 @@ class Reader {
         return {};
     }
 
+    Expected<void> readBasePages(PackData& d) {
+        const uint64_t texels = uint64_t{d.page_count} * d.page_height * d.page_width;
+        if (auto ok = expectBytes(ChunkType::BasePages, 0, texels * sizeof(TexelRecord)); !ok) return ok;
+        return array(ChunkType::BasePages, d.base_pages);
+    }
+
     Expected<void> readPayload(PackData& d) {
         for (uint32_t k = 0; k < d.contributions.size(); ++k) {
-            const size_t before = d.payload.size();
-            if (auto ok = array(ChunkType::Payload, d.payload, k); !ok) return ok;
-            if (d.payload.size() - before != d.contributions[k].receivers)
-                return bad("chunk PAYL {} holds {} records instead of {}", k, d.payload.size() - before,
-                           d.contributions[k].receivers);
+            const uint64_t receivers = d.contributions[k].receivers;
+            if (receivers > d.addresses.size())
+                return bad("contribution {} lists {} receivers of {}", k, receivers, d.addresses.size());
+            Expected<void> ok = expectBytes(ChunkType::Payload, k, receivers * sizeof(TexelRecord));
+            if (ok) ok = array(ChunkType::Payload, d.payload, k);
+            if (!ok) return ok;
         }
         return {};
     }
@@ -284,7 +312,7 @@ class Reader {
 
     static void readLocalGrids(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 68)) return;
+        if (!in.fits(count, 68)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             LocalGrid grid;
             grid.node = in.getString();
@@ -298,7 +326,7 @@ class Reader {
 
     static void readElements(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 12)) return;
+        if (!in.fits(count, 12)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             Element e;
             e.name = in.getString();
@@ -315,7 +343,7 @@ class Reader {
 
     static void readContributions(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 20)) return;
+        if (!in.fits(count, 20)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             Contribution c;
             c.light_set = optionalIndex(in);
@@ -329,7 +357,7 @@ class Reader {
 
     static void readMeshes(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 48)) return;
+        if (!in.fits(count, 48)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             Mesh m;
             m.node = in.getString();
@@ -346,7 +374,7 @@ class Reader {
 
     static void readViewpoints(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 32)) return;
+        if (!in.fits(count, 32)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             Viewpoint v;
             v.name = in.getString();
@@ -359,7 +387,7 @@ class Reader {
 
     static void readModelMeshes(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 72)) return;
+        if (!in.fits(count, 72)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             ModelMesh m;
             m.name = in.getString();
@@ -381,7 +409,7 @@ class Reader {
 
     static void readModels(ByteReader& in, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
-        if (!in.fits(count, 88)) return;
+        if (!in.fits(count, 88)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
             PlacedModel m;
             m.node = in.getString();

@@ -22,10 +22,7 @@ bool finite(std::span<const float> values) {
 }
 
 Expected<void> validatePages(const PackData& d) {
-    if (d.page_count == 0 || d.page_count > page_count_max || d.page_width == 0 || d.page_width > page_side_max ||
-        d.page_height == 0 || d.page_height > page_side_max)
-        return unusable("{} pages of {} x {} texels are outside 1..{} pages of 1..{} a side", d.page_count,
-                        d.page_width, d.page_height, page_count_max, page_side_max);
+    if (auto ok = validatePageSizes(d); !ok) return ok;
     const uint64_t texels = uint64_t{d.page_count} * d.page_width * d.page_height;
     if (d.base_pages.size() != texels)
         return unusable("its base holds {} texels, its pages {}", d.base_pages.size(), texels);
@@ -294,6 +291,14 @@ Expected<void> validateModels(const PackData& d) {
 }
 
 }  // namespace
+
+Expected<void> validatePageSizes(const PackData& data) {
+    if (data.page_count == 0 || data.page_count > page_count_max || data.page_width == 0 ||
+        data.page_width > page_side_max || data.page_height == 0 || data.page_height > page_side_max)
+        return unusable("{} pages of {} x {} texels are outside 1..{} pages of 1..{} a side", data.page_count,
+                        data.page_width, data.page_height, page_count_max, page_side_max);
+    return {};
+}
 
 Expected<void> validate(const PackData& data) {
     for (auto* check :

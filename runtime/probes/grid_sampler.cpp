@@ -11,6 +11,21 @@
 namespace dimmer {
 namespace {
 
+// Whether `words` hold the probes 0 .. end - 1.
+bool holds(std::span<const uint32_t> words, uint64_t end) {
+    return words.size() / (sizeof(ProbeRecord) / sizeof(uint32_t)) >= end;
+}
+
+// One past a slot's last probe; past all probes where it is no slot, as that of a local grid that is not there.
+uint64_t endOf(const ModelSlot& slot) {
+    uint64_t count = 1;
+    for (const uint32_t n : slot.counts) {
+        if (n < 1 || n > local_grid_side_max) return UINT64_MAX;
+        count *= n;
+    }
+    return slot.first_probe + count;
+}
+
 // Adds weight * the light of a probe.
 void add(const ProbeRecord& record, ColorFormat format, float weight, Radiance& sum) {
     const auto light = decodeColor(format, canonicalProbe(format, record).light);
@@ -44,8 +59,8 @@ bool GridSampler::empty() const {
 
 Radiance GridSampler::radiance(std::array<float, 3> point_m, GridHint* hint) const {
     Radiance sum;
-    if (empty()) return sum;
     const PackData& data = pack_.data();
+    if (empty() || !holds(probes_, data.probes.global.positions.size())) return sum;
     const GlobalGrid& grid = data.probes.global;
     const GridPlace place = locate(grid, point_m, hint ? hint->tetrahedron : no_tetrahedron);
     if (hint) hint->tetrahedron = place.tetrahedron;
@@ -63,6 +78,7 @@ std::array<float, 3> GridSampler::sample(std::array<float, 3> point_m, std::arra
 }
 
 Radiance GridSampler::radiance(const ModelSlot& slot, std::array<float, 3> point_m) const {
+    if (!holds(probes_, endOf(slot))) return {};
     std::array<uint32_t, 3> low;
     std::array<float, 3> share;
     for (size_t i = 0; i < 3; ++i) {

@@ -94,7 +94,7 @@ void settle(const GlobalGrid& grid, const Vec3& point, GridPlace& place) {
 
 }  // namespace
 
-GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint) {
+GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint, uint32_t steps_max) {
     const Vec3 point = clampToBox(grid.start, point_m);
     GridPlace place;
     place.tetrahedron = hint;
@@ -107,7 +107,7 @@ GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t 
     }
     if (!found) {
         place.tetrahedron = startOf(grid, point);
-        walk(grid, point, walk_steps_max, place);
+        walk(grid, point, steps_max, place);
         settle(grid, point, place);
     }
     place.barycentric = clampWeights(place.barycentric);

@@ -30,8 +30,10 @@ struct GridPlace {
 };
 
 // `hint`: a tetrahedron that is likely near, or no_tetrahedron. A point outside the grid's box gets the place of the
-// box's nearest point, one that is not a number some place. The grid is not empty. Thread-safe.
-GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint = no_tetrahedron);
+// box's nearest point, one that is not a number some place. The grid is not empty. Thread-safe. `steps_max`: of the
+// walk from the start grid; only who makes that grid has a reason for more.
+GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint = no_tetrahedron,
+                 uint32_t steps_max = walk_steps_max);
 
 // The shares of the four probes in the light at a place: barycentric among those that see it, or among all when none
 // does. Each 0..1, sum 1.

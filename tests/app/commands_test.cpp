@@ -1,5 +1,7 @@
 // The contract with scripts: exit codes, what goes to stdout and what to stderr, names of JSON keys, help.
 #include <app/tool_fixture.h>
+#include <pack/sample_pack.h>
+#include <write/pack_writer.h>
 
 namespace dimmer::test {
 namespace {
@@ -119,6 +121,32 @@ TEST_F(Commands, InspectTableAndSettings) {
     EXPECT_EQ(settings.exit_code, 0);
     EXPECT_THAT(settings.out, testing::ContainsRegex("lightmaps.texels_per_metre +4[.0]* +desktop"));
     EXPECT_THAT(settings.out, testing::ContainsRegex("bake.draft.rays +32 +quick.json"));
+}
+
+// A set's own light and what doors make of it have names of their own, and counts that their bytes follow from: 8 a
+// texel, 28 a probe.
+TEST_F(Commands, InspectTellsContributionsApart) {
+    PackData data = samplePack();
+    Random random(1);
+    addRandomProbes(data, random);
+    const auto bytes = cook::packBytes(data);
+    const std::string doors = write("doors.dimmer", {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    const auto table = runDimmer({"inspect", doors});
+    ASSERT_EQ(table.exit_code, 0) << table.err;
+    EXPECT_THAT(table.out, testing::ContainsRegex("contribution +texels +probes +bytes"));
+    // emptyPack(): four sets, then of each door always-on light through and off it, and a set's.
+    for (const auto& [k, name] : {std::pair<size_t, const char*>{0, "set0"},
+                                  {4, "always through door:door0"},
+                                  {5, "always off closed door:door0"},
+                                  {6, "set0 through door:door0"},
+                                  {12, "set0 through door:door0 through door:door1"},
+                                  {13, "set1 through door:door0 off closed door:door1"}})
+        EXPECT_THAT(table.out,
+                    testing::ContainsRegex(fmt::format("\n{} +{} +{} +[0-9]", name, data.contributions[k].receivers,
+                                                       data.probes.record_counts[k])));
+    const json j = json::parse(runDimmer({"inspect", doors, "--json"}).out);
+    for (const json& c : j["contributions"])
+        EXPECT_EQ(c["bytes"], 8 * c["receivers"].get<uint64_t>() + 28 * c["probes"].get<uint64_t>());
 }
 
 TEST_F(Commands, InspectJson) {

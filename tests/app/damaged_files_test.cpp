@@ -71,6 +71,7 @@ TEST_F(DamagedFiles, PacksWithStrangeSettings) {
         }
         EXPECT_EQ(json::parse(runDimmer({"inspect", file("settings.dimmer"), "--json"}).out)["settings"],
                   json::object());
+        EXPECT_EQ(runDimmer({"report", file("settings.dimmer"), "-o", file("settings.html")}).exit_code, 0);
     }
 }
 

@@ -22,7 +22,7 @@ TEST_F(Interrupt, ACookEndsAndLeavesTheOldPack) {
     write("kept.dimmer", "the old pack");
     const std::filesystem::path folder = std::filesystem::path(pack()).parent_path();
     const auto before = namesIn(folder);
-    for (const auto& [signal, exit_code] : {std::pair{SIGINT, 130}, {SIGTERM, 143}}) {
+    for (const auto& [signal, exit_code] : {std::pair{SIGINT, 130}, {SIGTERM, 143}, {SIGHUP, 129}}) {
         const auto result = runInterrupted(DIMMER_TOOL,
                                            {"cook", file("level.gltf"), "-o", file("kept.dimmer"), "--profile",
                                             file("long.json"), "--quality", "draft"},

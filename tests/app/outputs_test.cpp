@@ -1,5 +1,6 @@
 // Files that a command writes: never its own input or another output, and looked at before the work, not after it.
 #include <app/tool_fixture.h>
+#include <dimmer/pack.h>
 
 namespace dimmer::test {
 namespace {
@@ -56,6 +57,74 @@ TEST_F(Outputs, NeverTheLevelThePackOrOneAnother) {
     for (const std::string& path : {new_pack, json}) EXPECT_FALSE(std::filesystem::exists(path)) << path;
 }
 
+// By a URI, escaped or absolute, and by the sky's key, which is no URI.
+TEST_F(Outputs, NeverAFileThatTheLevelNames) {
+    cook::test::LevelFile parts;
+    parts.document = json::parse(R"({"asset": {"version": "2.0"}, "buffers": [{"uri": "parts.bin", "byteLength": 4},
+        {"uri": "data:application/octet-stream;base64,AAAA", "byteLength": 3}],
+        "images": [{"uri": "wall%20paint.png"}, {"uri": "heat/page_0.png"}],
+        "scenes": [{"extras": {"dimmer_sky_image": "sky%20.hdr"}}]})");
+    parts.document["extensions"]["EXT_lights_ies"]["lights"] = json::array({{{"uri", file("far.ies")}}});
+    const auto binary = parts.glb();
+    const std::string csv = points(), gltf = write("parts.gltf", parts.gltfText()),
+                      glb = write("parts.glb", {binary.begin(), binary.end()});
+    for (const char* name : {"parts.bin", "wall paint.png", "far.ies", "sky%20.hdr"}) {
+        const std::string part = write(name, "kept");
+        for (const std::string& level : {gltf, glb}) {
+            expectSameFile({"cook", level, "-o", part}, "--output", "a file of LEVEL");
+            expectSameFile({"cook", level, "-o", file("other.dimmer"), "--report", part}, "--report",
+                           "a file of LEVEL");
+            expectSameFile({"verify", level, pack(), "--csv", part}, "--csv", "a file of LEVEL");
+            expectSameFile({"reference", level, "--points", csv, "-o", part}, "--output", "a file of LEVEL");
+        }
+        EXPECT_EQ(readText(part), "kept");
+    }
+    std::filesystem::create_directory(file("heat"));
+    const std::string picture = write("heat/page_0.png", "kept");
+    expectSameFile({"verify", gltf, pack(), "--heatmap", file("heat")}, "a file of --heatmap", "a file of LEVEL");
+    expectSameFile({"report", pack(), "-o", picture, "--heatmap", file("heat")}, "--output", "a file of --heatmap");
+    EXPECT_EQ(readText(picture), "kept");
+    const std::string deep =
+        write("deep.gltf", R"({"extras": )" + std::string(200000, '[') + std::string(200000, ']') + "}");
+    expectRefusedAtOnce({"cook", deep, "-o", file("other.dimmer")}, {"deep.gltf", "nests"});
+    EXPECT_FALSE(std::filesystem::exists(file("other.dimmer")));
+}
+
+TEST_F(Outputs, NeverAProfileThatTheProfileExtends) {
+    const std::string base = write("base.json", R"({"extends": "console"})");
+    const std::string middle = write("middle.json", R"({"extends": "base.json"})");
+    const std::string top = write("top.json", R"({"extends": "middle.json"})");
+    for (const std::string& profile : {base, middle})
+        expectSameFile({"cook", level(), "-o", profile, "--profile", top}, "--output", "a file of --profile");
+    EXPECT_EQ(readText(base), R"({"extends": "console"})");
+}
+
+// The pack is there then, and what was to be said of the level and of the written one is said, once.
+TEST_F(Outputs, WhatFailsBesideThePackSaysSo) {
+    json warned = json::parse(readText(level()));
+    warned["nodes"][0]["extras"]["dimmer_texel_densty"] = 2;
+    json& attributes = warned["meshes"][0]["primitives"][0]["attributes"];
+    attributes["COLOR_0"] = attributes["POSITION"];
+    write("warned.gltf", warned.dump());
+    const auto count = [](const std::string& text, const std::string& word) {
+        size_t n = 0;
+        for (size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++n;
+        return n;
+    };
+    for (const char* failing : {"--write-level", "--report", "--json"}) {
+        std::filesystem::remove(file("warned.dimmer"));
+        std::vector<std::string> more = {failing, "/dev/full"};
+        if (failing != std::string("--write-level")) more.insert(more.end(), {"--write-level", file("warned.glb")});
+        const auto result = cook("warned.dimmer", more, "warned.gltf");
+        EXPECT_EQ(result.exit_code, 2) << failing;
+        EXPECT_THAT(result.err, AllOf(HasSubstr("dimmer: error: /dev/full"),
+                                      HasSubstr("dimmer: The pack has been written: " + file("warned.dimmer") + "\n")));
+        EXPECT_EQ(count(result.err, "'dimmer_texel_densty'"), 1u) << failing << result.err;
+        EXPECT_EQ(count(result.err, "COLOR_0 is not written"), 1u) << failing << result.err;
+        EXPECT_TRUE(Pack::open(file("warned.dimmer")).has_value()) << failing;
+    }
+}
+
 TEST_F(Outputs, OtherNamesOfTheSameFile) {
     const std::filesystem::path folder = std::filesystem::path(pack()).parent_path();
     std::filesystem::create_directory(folder / "names");
@@ -72,6 +141,8 @@ TEST_F(Outputs, OtherNamesOfTheSameFile) {
     std::filesystem::copy_file(pack(), folder / "light/index.json");
     expectSameFile({"export", file("light/index.json"), file("light")}, "a file of DIR", "PACK");
     EXPECT_EQ(readText(file("light/index.json")), readText(pack()));
+    std::filesystem::create_symlink("light/index.json", folder / "linked.dimmer");
+    expectSameFile({"export", file("linked.dimmer"), file("light")}, "a file of DIR", "PACK");
 }
 
 TEST_F(Outputs, DevicesMayServeTwice) {

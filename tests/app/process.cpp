@@ -24,12 +24,13 @@ class Process {
         posix_spawn_file_actions_addopen(&files, 0, in.c_str(), O_RDONLY, 0);
         posix_spawn_file_actions_addopen(&files, 1, out_.c_str(), O_WRONLY | O_CREAT, 0600);
         posix_spawn_file_actions_addopen(&files, 2, err_.c_str(), O_WRONLY | O_CREAT, 0600);
-        // Shells have their background jobs ignore SIGINT, and so it would be passed on from the tests.
+        // Shells have their background jobs ignore SIGINT, `nohup` SIGHUP and Python SIGPIPE, and so it would be passed
+        // on from the tests.
         posix_spawnattr_t attributes;
         posix_spawnattr_init(&attributes);
         sigset_t signals;
         sigemptyset(&signals);
-        for (const int signal : {SIGINT, SIGTERM}) sigaddset(&signals, signal);
+        for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGPIPE}) sigaddset(&signals, signal);
         posix_spawnattr_setsigdefault(&attributes, &signals);
         posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGDEF);
         std::vector<char*> argv = {const_cast<char*>(program.c_str())};

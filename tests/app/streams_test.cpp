@@ -1,5 +1,7 @@
 // Standard streams that are full or closed, and what a reader of stderr may rely on.
 #include <app/tool_fixture.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
 
 namespace dimmer::test {
 namespace {
@@ -17,15 +19,20 @@ class Streams : public ToolTest {
         words.insert(words.end(), arguments.begin(), arguments.end());
         return runProcess("/bin/sh", words);
     }
+    // Redirects a stream to a pipe whose reader has gone: a named one opens for writing because the shell reads it.
+    static std::string withoutReader(int stream) {
+        const std::string pipe = file("pipe");
+        mkfifo(pipe.c_str(), 0600);  // but once
+        return fmt::format("3<>'{0}' {1}>'{0}' 3<&-", pipe, stream);
+    }
+    static std::vector<std::string> lostStderr() { return {"2>/dev/full", "2>&-", withoutReader(2)}; }
     static std::vector<std::string> cookTo(const std::string& name, const std::string& profile = "quick.json") {
         return {"cook", file("level.gltf"), "-o", file(name), "--profile", file(profile), "--quality", "draft"};
     }
 };
 
-constexpr const char* lost_stderr[] = {"2>/dev/full", "2>&-"};
-
 TEST_F(Streams, WorkIsDoneWithoutStderr) {
-    for (const char* redirection : lost_stderr)
+    for (const std::string& redirection : lostStderr())
         for (const char* progress : {"text", "json"}) {
             auto arguments = cookTo("unseen.dimmer");
             arguments.insert(arguments.end(), {"--progress", progress, "--no-cache"});
@@ -40,7 +47,7 @@ TEST_F(Streams, WorkIsDoneWithoutStderr) {
 TEST_F(Streams, ExitCodesStayWithoutStderr) {
     write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 30000}})");
     const std::string far = write("far.csv", "x,y,z,nx,ny,nz\n99,0,0,0,1,0\n");
-    for (const char* redirection : lost_stderr) {
+    for (const std::string& redirection : lostStderr()) {
         EXPECT_EQ(redirected(cookTo("no.dimmer", "tight.json"), redirection).exit_code, 3) << redirection;
         EXPECT_EQ(redirected({"inspect", file("none.dimmer")}, redirection).exit_code, 2) << redirection;
         EXPECT_EQ(redirected({"inspect", "--nonsense"}, redirection).exit_code, 2) << redirection;
@@ -73,6 +80,19 @@ TEST_F(Streams, OutputThatIsLostIsSaid) {
         }
     EXPECT_EQ(redirected({"inspect", pack()}, ">/dev/full 2>&1").exit_code, 2);
     EXPECT_EQ(redirected({"inspect", pack()}, ">&- 2>&-").exit_code, 2);
+}
+
+// `dimmer inspect PACK | head -1` is no mistake that anybody wants to read of; a script still sees that it is not all.
+TEST_F(Streams, AReaderThatHasEnoughIsNotTold) {
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"inspect", pack()}, {"inspect", pack(), "--json"}, {"--help"}}) {
+        const auto result = redirected(arguments, withoutReader(1));
+        EXPECT_EQ(result.exit_code, 2) << arguments[0];
+        EXPECT_THAT(result.err, IsEmpty()) << arguments[0];
+    }
+    EXPECT_EQ(redirected({"inspect", file("none.dimmer")}, withoutReader(1)).exit_code, 2);
+    EXPECT_EQ(redirected(cookTo("unheard.dimmer"), withoutReader(1)).exit_code, 2);
+    EXPECT_TRUE(readText(file("unheard.dimmer")) == readText(pack()));
 }
 
 // What --help of cook promises: stderr is lines of JSON and lines behind "dimmer: ", be it over budget or misused.

@@ -5,6 +5,7 @@
 #include <bake/test_scenes.h>
 #include <tbb/global_control.h>
 
+#include <limits>
 #include <random>
 #include <set>
 
@@ -189,6 +190,16 @@ TEST(LightGrid, ThreadsChangeNothing) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
     const LightGrid one(rays);
     for (float x = -3; x < 45; x += 0.5f) EXPECT_EQ(listedAt(many, {x, -1.9f, 0.3f}), listedAt(one, {x, -1.9f, 0.3f}));
+}
+
+// As exporters write that know no range.
+TEST(LightGrid, ALampsRangeMayBeAnyNumber) {
+    Scene scene = rooms(2);
+    const RayScene without(scene);
+    const auto expected = listedAt(LightGrid(without), {8, 0, 0});
+    scene.lights[1].range_m = std::numeric_limits<float>::max();
+    const RayScene with(scene);
+    EXPECT_EQ(listedAt(LightGrid(with), {8, 0, 0}), expected);
 }
 
 }  // namespace

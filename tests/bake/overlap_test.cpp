@@ -30,6 +30,7 @@ std::vector<uint32_t> termsAt(const Baked& baked, size_t row) {
 }
 
 using Terms = std::vector<uint32_t>;
+const std::vector<float> same_areas(4, 1.0f);
 
 TEST(Overlap, TheBrightestStayInTheirOrder) {
     // Always-on light stays however faint it is, and does not count; of equals the first stays.
@@ -40,7 +41,7 @@ TEST(Overlap, TheBrightestStayInTheirOrder) {
         {},
     };
     Baked baked = bakedOf(rows, 5);
-    limitOverlap(baked, 2);
+    limitOverlap(baked, same_areas, 2);
     EXPECT_EQ(termsAt(baked, 0), (Terms{0, 1, 4}));
     EXPECT_EQ(termsAt(baked, 1), (Terms{1, 2}));
     EXPECT_EQ(termsAt(baked, 2), (Terms{0, 2}));
@@ -50,16 +51,17 @@ TEST(Overlap, TheBrightestStayInTheirOrder) {
 TEST(Overlap, WhatGoesIsReported) {
     Baked baked = bakedOf({{lit(1, 3), lit(2, 1)}, {lit(2, 3)}}, 3);
     baked.reports[2].energy_dropped = 0.5;  // half of it below the threshold before
-    limitOverlap(baked, 1);
+    limitOverlap(baked, std::vector<float>{4, 1}, 1);
     EXPECT_DOUBLE_EQ(baked.reports[1].energy_dropped, 0);
-    EXPECT_DOUBLE_EQ(baked.reports[2].energy_dropped, 0.5 + 0.5 * 0.25);
+    // Of 1 lux on 4 m2 and 3 lux on 1 m2, the first go.
+    EXPECT_DOUBLE_EQ(baked.reports[2].energy_dropped, 0.5 + 0.5 * 4 / 7);
 }
 
 TEST(Overlap, NoLimitChangesNothing) {
     Baked baked = bakedOf({{lit(0, 1), lit(1, 3), lit(2, 1)}}, 3);
-    limitOverlap(baked, 0);
+    limitOverlap(baked, same_areas, 0);
     EXPECT_EQ(termsAt(baked, 0), (Terms{0, 1, 2}));
-    limitOverlap(baked, 2);
+    limitOverlap(baked, same_areas, 2);
     EXPECT_EQ(termsAt(baked, 0), (Terms{0, 1, 2}));
 }
 

@@ -93,5 +93,11 @@ TEST(RayEnds, OfDamagedBytesAreReceiversThatAreThere) {
     EXPECT_EQ(strange, 0u);
 }
 
+TEST(RayEnds, OfLargeLevelsFewerAreKept) {
+    EXPECT_EQ(RayEnds(100'000, 100'000, paths).keptMax(), kept_rays_max);
+    // 21 bits for each of 1.08 million receivers: 2^32 / (21 * 1.08 million).
+    EXPECT_EQ(RayEnds(1'080'000, 1'080'000, paths).keptMax(), 189u);
+}
+
 }  // namespace
 }  // namespace dimmer::cook

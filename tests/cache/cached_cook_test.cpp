@@ -342,5 +342,18 @@ TEST_F(CachedCook, TwoAtOnce) {
     EXPECT_THAT(made(level), IsEmpty());
 }
 
+TEST_F(CachedCook, WarnsOfModelsWhoseLightIsAllThere) {
+    LevelFile level = houseOfTwo();
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "shelf") node["extras"]["dimmer_grid_spacing"] = 0.05;
+    json settings = json::parse(quick_profile);
+    settings["grids"]["local_probes_max"] = 1000;
+    writeText(folder, "quick.json", settings.dump());
+    const auto warnings = run(level, true).stats.warnings;
+    EXPECT_THAT(warnings, testing::Contains(HasSubstr("'shelf': of its")));
+    lamp(level, 2)["intensity"] = 137.31;
+    EXPECT_EQ(run(level, true).stats.warnings, warnings);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -3,6 +3,9 @@
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <gtest/gtest.h>
+#include <scene/open_pose.h>
+
+#include <algorithm>
 
 namespace dimmer::cook::test {
 namespace {
@@ -44,6 +47,47 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
     }
 }
 
+// A rug of the floor's outline, 3 mm over it: no texel is of both, and the rug's are whole.
+TEST(Texels, OfAThinRugAreNotTheFloors) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addFloor(scene, 1, white);
+    addFloor(scene, 1, white, 0.003f);
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 64});
+    ASSERT_TRUE(charts.has_value());
+    const Texels texels = sampleTexels(rays, *charts, 4);
+    size_t of_rug = 0;
+    for (size_t i = 0; i < texels.size(); ++i) {
+        const bool is_rug = texels.sample(i, 0).position_m.y > 0.003f;
+        if (is_rug) {
+            ++of_rug;
+            EXPECT_EQ(texels.sampleCount(i), 4u);
+        }
+        for (uint32_t s = 0; s < texels.sampleCount(i); ++s)
+            EXPECT_EQ(texels.sample(i, s).position_m.y > 0.003f, is_rug);
+    }
+    EXPECT_EQ(of_rug, 64u);  // 2 m x 2 m
+}
+
+// A sliding door that moves by its width: the open leaf goes on where the closed one ends, and is another surface.
+TEST(Charts, OfAnOpenLeafAreNotTheClosedOnes) {
+    Scene scene;
+    scene.doors.push_back({"front", true});
+    SceneMesh& leaf = addQuad(scene, "leaf", {0, 1, 0}, {0.5f, 0, 0}, {0, 1, 0}, addMaterial(scene, lambert(0.5f)));
+    leaf.door = 0;
+    leaf.open_from_closed[3] = {1, 0, 0, 1};
+    addOpenLeaves(scene);
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 64});
+    ASSERT_TRUE(charts.has_value());
+    ASSERT_EQ(charts->faces.size(), 4u);
+    const auto chartOf = [&](uint32_t triangle) { return charts->face_chart[charts->front_face[triangle]]; };
+    EXPECT_EQ(chartOf(0), chartOf(1));
+    EXPECT_EQ(chartOf(2), chartOf(3));
+    EXPECT_NE(chartOf(0), chartOf(2));
+}
+
 // 400 m at 4 texels per metre are 1600 texels; a page of 256 keeps 254 of them: 6.3 times as coarse.
 TEST(Charts, SaysWhatIsTooLargeForAPage) {
     Scene scene;
@@ -59,8 +103,8 @@ TEST(Charts, SaysWhatIsTooLargeForAPage) {
     EXPECT_TRUE(unwrap(rays, {.texels_per_metre = 4, .page_size = 4096})->warnings.empty());
 }
 
-// What a remedy says of a lower density: charts as unwrap() then makes them, and the pages that it packs.
-TEST(Charts, OfLongerTexelsAreForetold) {
+// Forty quads of many shapes, none in another's plane.
+Scene manyQuads() {
     Scene scene;
     const uint32_t white = addMaterial(scene, lambert(0.5f));
     for (int i = 0; i < 40; ++i) {
@@ -68,6 +112,40 @@ TEST(Charts, OfLongerTexelsAreForetold) {
         addQuad(scene, "quad", {0, 5 * side, 0}, {1.3f + 0.37f * static_cast<float>(i % 5), 0, 0},
                 {0, 0, 0.7f + 0.21f * side}, white);
     }
+    return scene;
+}
+
+// What a chart stores, no other one may overwrite; and its ring is all padding.
+TEST(Charts, LieApartOnTheirPages) {
+    const Scene scene = manyQuads();
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 128});
+    ASSERT_TRUE(charts.has_value());
+    ASSERT_EQ(charts->charts.size(), 40u);
+    ASSERT_GT(charts->page_count, 1u);  // some 30000 texels
+    const size_t width = charts->page_width, height = charts->page_height;
+    std::vector<int> charts_at(charts->page_count * width * height);
+    for (const Chart& c : charts->charts) {
+        ASSERT_LT(c.page, charts->page_count);
+        ASSERT_LE(c.x + c.width, width);
+        ASSERT_LE(c.y + c.height, height);
+        for (size_t y = c.y; y < c.y + c.height; ++y)
+            for (size_t x = c.x; x < c.x + c.width; ++x) ++charts_at[(c.page * height + y) * width + x];
+    }
+    EXPECT_EQ(std::ranges::max(charts_at), 1);
+    for (size_t f = 0; f < charts->faces.size(); ++f) {
+        const Chart& c = charts->charts[charts->face_chart[f]];
+        const glm::vec2 low(c.x + 1, c.y + 1), high(c.x + c.width - 1, c.y + c.height - 1);
+        for (const glm::vec2 uv : charts->uv_texels[f]) {
+            EXPECT_TRUE(glm::all(glm::greaterThan(uv, low - 1e-3f))) << f;
+            EXPECT_TRUE(glm::all(glm::lessThan(uv, high + 1e-3f))) << f;
+        }
+    }
+}
+
+// What a remedy says of a lower density: charts as unwrap() then makes them, and the pages that it packs.
+TEST(Charts, OfLongerTexelsAreForetold) {
+    const Scene scene = manyQuads();
     const RayScene rays(scene);
     const auto fine = unwrap(rays, {.texels_per_metre = 8, .page_size = 2048});
     ASSERT_TRUE(fine.has_value());

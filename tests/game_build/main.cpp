@@ -2,11 +2,20 @@
 #include <dimmer/runtime.h>
 
 #include <cstdio>
+#include <limits>
 
-// Links, and answers what every game must expect: that there is no such pack.
+// Links, and answers what every game must expect: that there is no such pack, and that NaN is no place.
 int main() {
-    const auto pack = dimmer::Pack::open("no such pack.dimmer");
-    if (pack) return 1;
-    std::printf("%s\n", pack.error().message.c_str());
-    return pack.error().code == dimmer::ErrorCode::Io ? 0 : 1;
+    const auto missing = dimmer::Pack::open("no such pack.dimmer");
+    if (missing || missing.error().code != dimmer::ErrorCode::Io) return 1;
+    std::printf("%s\n", missing.error().message.c_str());
+    const auto pack = dimmer::Pack::open(GAME_PACK);
+    if (!pack) return 1;
+    dimmer::CpuRuntime lights(*pack);
+    dimmer::Transform nowhere;
+    nowhere.rows[0][3] = std::numeric_limits<float>::quiet_NaN();
+    const auto refused = lights.addModel({}, nowhere);
+    if (refused || refused.error().code != dimmer::ErrorCode::InvalidArgument) return 1;
+    std::printf("%s\n", refused.error().message.c_str());
+    return 0;
 }

@@ -53,5 +53,14 @@ TEST(SampleExposure, BlackIsBlackBrightIsWhiteAndAllIsMonotonic) {
     EXPECT_NEAR(grey(3), 141, 1);
 }
 
+TEST(SampleExposure, ComesBackFromABlaze) {
+    AutoExposure exposure(1, 30);
+    EXPECT_GT(exposure.update(std::numeric_limits<float>::infinity(), true), 0.0f);
+    float now = 0;
+    for (int frame = 0; frame < 300; ++frame) now = exposure.update(4, false);
+    AutoExposure rested(1, 30);
+    EXPECT_NEAR(now / rested.update(4, true), 1, 1e-2);  // ten time constants
+}
+
 }  // namespace
 }  // namespace dimmer::sample

@@ -236,8 +236,8 @@ TEST(SamplePlayer, WritesPicturesAndCosts) {
     EXPECT_EQ(events.back().what, "set lamp=0.5");
     EXPECT_EQ(events.back().median.receivers, 64u);
     EXPECT_EQ(events.back().median.batches, 1u);
-    EXPECT_EQ(played->cost.idleMedian().dispatches, 0u);
-    EXPECT_GE(played->cost.idleFrames(), 2u);
+    EXPECT_EQ(played->cost.unchangedFrames().median.dispatches, 0u);
+    EXPECT_GE(played->cost.unchangedFrames().frames, 2u);
     std::filesystem::remove_all(out);
 }
 

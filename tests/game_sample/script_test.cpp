@@ -142,5 +142,13 @@ TEST(SampleScript, RefusesWeightsThatTheRuntimeWouldRefuse) {
     EXPECT_EQ(parse("at 0 set alarm=2").steps.size(), 1u);
 }
 
+// A '#' within a name or a text is no comment.
+TEST(SampleScript, CommentsBeginWords) {
+    EXPECT_EQ(parse("frames 4 # four").frames, 4u);
+    EXPECT_EQ(parse("# nothing\nframes 5\t#five").frames, 5u);
+    EXPECT_THAT(parseError("at 0 set hall#1=0.5"), HasSubstr("hall#1"));
+    EXPECT_THAT(parseError("camera \"cam #2\""), HasSubstr("cam #2"));
+}
+
 }  // namespace
 }  // namespace dimmer::sample

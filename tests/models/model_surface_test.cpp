@@ -98,6 +98,32 @@ TEST(ModelPlaces, WhatIsDoubleSidedHasPlacesOnBothSides) {
     EXPECT_NEAR(static_cast<double>(front), 200, 10);
 }
 
+// Two nodes of two meshes each, one after another and between each other's, and a thing that moves: no ray meets it.
+TEST(ForTriangles, AreThoseOfTheModelInTheOrderOfTheLevel) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {3, 3, 3}, grey);
+    addCrate(scene, "a", placed({0, 0, 0}), {1, 1, 1}, grey).gltf_node = 1;
+    addCrate(scene, "b", placed({0, 0, 0}), {1, 1, 1}, grey).gltf_node = 2;
+    addCrate(scene, "c", placed({0, 0, 0}), {1, 1, 1}, grey, Lighting::Dynamic).gltf_node = 3;
+    addCrate(scene, "a", placed({0, 0, 0}), {1, 1, 1}, grey).gltf_node = 1;
+    addCrate(scene, "b", placed({0, 0, 0}), {1, 1, 1}, grey).gltf_node = 2;
+    listModels(scene, {});
+    ASSERT_EQ(scene.models.size(), 3u);
+    const RayScene rays(scene);
+    for (uint32_t model = 0; model < 3; ++model) {
+        std::vector<uint32_t> expected, visited;
+        for (uint32_t t = 0; t < rays.triangles().size(); ++t)
+            if (scene.meshes[rays.triangles()[t].mesh].model == model) expected.push_back(t);
+        EXPECT_EQ(expected.size(), scene.models[model].node == "c" ? 0u : 24u);
+        forTriangles(rays, model, [&](uint32_t t, const LevelTriangle& triangle) {
+            EXPECT_EQ(&triangle, &rays.triangles()[t]);
+            visited.push_back(t);
+        });
+        EXPECT_EQ(visited, expected) << scene.models[model].node;
+    }
+}
+
 TEST(FindTransfers, ModelsOfOneShapeShareTheirs) {
     Scene scene = crateInstances();
     // Which set dims it changes nothing of what it hides from itself: nor may it change which models share.

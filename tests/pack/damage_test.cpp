@@ -166,7 +166,22 @@ TEST(PackDamage, SwappedChunks) {
     EXPECT_GT(swapped, 100);
 }
 
-// The table is right about its own hash and wrong about the file.
+// The same file with another table, which is right about its own hash.
+Bytes withTable(Bytes file, const std::function<void(std::vector<format::Chunk>&)>& change) {
+    format::Header header;
+    std::memcpy(&header, file.data(), sizeof(header));
+    std::vector<format::Chunk> table(header.chunk_count);
+    const size_t table_bytes = table.size() * sizeof(table[0]);
+    std::memcpy(table.data(), file.data() + sizeof(header), table_bytes);
+    change(table);
+    std::memcpy(file.data() + sizeof(header), table.data(), table_bytes);
+    header.xxh64 = 0;
+    std::memcpy(file.data(), &header, sizeof(header));
+    header.xxh64 = XXH64(file.data(), sizeof(header) + table_bytes, 0);
+    std::memcpy(file.data(), &header, sizeof(header));
+    return file;
+}
+
 TEST(PackDamage, ChunksOutOfPlace) {
     const Bytes whole = packBytes(samplePack());
     const std::vector<std::pair<std::function<void(format::Chunk&)>, std::string>> faults = {
@@ -177,26 +192,33 @@ TEST(PackDamage, ChunksOutOfPlace) {
         {[](format::Chunk& c) { c.stored_bytes = UINT64_MAX; }, "past the end"},
         {[&](format::Chunk& c) { c.stored_bytes = whole.size(); }, "past the end"},
         {[](format::Chunk& c) { c.real_bytes = UINT64_MAX; }, "impossible size"},
-        {[](format::Chunk& c) { c.real_bytes += 1; }, "that it states"},
+        // 2 pages of 32 x 32.
+        {[](format::Chunk& c) { c.real_bytes += 1; }, "states 16385 bytes instead of 16384"},
         {[](format::Chunk& c) { c.shuffle = 0; }, "impossible size"},
         {[](format::Chunk& c) { c.xxh64 ^= 1; }, "is damaged"},
     };
     for (size_t i = 0; i < faults.size(); ++i) {
-        Bytes file = whole;
-        format::Header header;
-        std::memcpy(&header, file.data(), sizeof(header));
-        const size_t place = sizeof(header) + 2 * sizeof(format::Chunk);  // BASE
-        format::Chunk chunk;
-        std::memcpy(&chunk, file.data() + place, sizeof(chunk));
-        faults[i].first(chunk);
-        std::memcpy(file.data() + place, &chunk, sizeof(chunk));
-        header.xxh64 = 0;
-        std::memcpy(file.data(), &header, sizeof(header));
-        header.xxh64 = XXH64(file.data(), sizeof(header) + header.chunk_count * sizeof(chunk), 0);
-        std::memcpy(file.data(), &header, sizeof(header));
+        const Bytes file = withTable(whole, [&](auto& table) { faults[i].first(table[2]); });  // BASE
         expectRefused(file, "chunk BASE", fmt::format("fault {}", i));
         expectRefused(file, faults[i].second, fmt::format("fault {}", i));
     }
+}
+
+// Of one frame under many names, 31 kB unfolded to hundreds of megabytes.
+TEST(PackDamage, ChunksThatShareBytes) {
+    const Bytes whole = packBytes(samplePack());
+    // The entry `thief` of the table names what `owner` has, or that from its second 64 bytes on.
+    const auto shared = [&](size_t thief, size_t owner, uint64_t skipped) {
+        return withTable(whole, [&](auto& table) {
+            table[thief].offset = table[owner].offset + skipped;
+            table[thief].stored_bytes = table[owner].stored_bytes - skipped;
+            table[thief].real_bytes = table[owner].real_bytes;
+            table[thief].xxh64 = table[owner].xxh64;
+        });
+    };
+    expectRefused(shared(0, 2, 0), "chunk ELEM and chunk BASE share bytes");
+    expectRefused(shared(0, 2, 64), "chunk BASE and chunk ELEM share bytes");
+    expectRefused(shared(8, 7, 0), "chunk PAYL 0 and chunk PAYL 1 share bytes");
 }
 
 TEST(PackDamage, TooManyChunksForTheFile) {

@@ -52,6 +52,19 @@ TEST(CookHouse, SameBytesOnAnyNumberOfThreads) {
     expectSameBytesOnAnyNumberOfThreads(level, "desktop", folder);
 }
 
+// As their seconds do: a fit cooks again and again with the same statistics.
+TEST(Cook, RaysOfEveryRoundCount) {
+    const auto scene = twoCells().import();
+    ASSERT_TRUE(scene) << scene.error().message;
+    SilentProgress silent;
+    CookStats stats;
+    ASSERT_TRUE(cookScene(*scene, smallProfile(), "draft", silent, stats));
+    const uint64_t once = stats.rays;
+    ASSERT_GT(once, 0u);
+    ASSERT_TRUE(cookScene(*scene, smallProfile(), "draft", silent, stats));
+    EXPECT_EQ(stats.rays, 2 * once);
+}
+
 // Names of files and folders are not part of a cook.
 TEST(Cook, SameBytesFromAnotherFolder) {
     const TemporaryFolder here, there;

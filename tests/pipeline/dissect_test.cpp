@@ -82,18 +82,43 @@ TEST(Dissect, FinerFormatsAreMeasuredAsFiner) {
     }
 }
 
-TEST(Dissect, PacksThatNoLevelWasCookedIntoAreRefused) {
-    const Scene scene = cells();
-    SilentProgress progress;
+struct CountedStages final : Progress {
+    int count = 0;
+    void stage(std::string_view, uint64_t) override { ++count; }
+    void advance(uint64_t) override {}
+    void finish() override {}
+};
+
+// Before anything is measured.
+TEST(Dissect, WhatCannotBeToldApartIsRefusedAtOnce) {
+    LevelFile level = twoCells();
+    level.addNode(
+        {{"name", "leaf"}, {"mesh", addRoomMesh(level, {3, 0, 0}, 1, 0)}, {"extras", {{"dimmer_door", "front"}}}});
+    const auto scene = level.import();
+    ASSERT_TRUE(scene) << scene.error().message;
+    SilentProgress silent;
     CookStats stats;
-    auto data = cookScene(scene, smallProfile(), "draft", progress, stats);
-    ASSERT_TRUE(data);
-    PackData unnamed = *data;
-    unnamed.settings_json = "{}";
-    const VerifyOptions options{.state = "", .points = 10, .paths_max = 64, .sets = false, .causes = true};
-    const auto foreign = verify(scene, *Pack::fromData(std::move(unnamed)), options, progress);
-    ASSERT_FALSE(foreign);
-    EXPECT_NE(foreign.error().message.find("no quality"), std::string::npos) << foreign.error().message;
+    const auto data = cookScene(*scene, smallProfile(), "draft", silent, stats);
+    ASSERT_TRUE(data) << data.error().message;
+    const auto expectRefused = [&](const std::string& settings, const VerifyOptions& options, const char* words) {
+        PackData changed = *data;
+        changed.settings_json = settings;
+        CountedStages progress;
+        const auto report = verify(*scene, *Pack::fromData(std::move(changed)), options, progress);
+        ASSERT_FALSE(report) << words;
+        EXPECT_NE(report.error().message.find(words), std::string::npos) << report.error().message;
+        EXPECT_EQ(progress.count, 0) << words;
+    };
+    VerifyOptions causes{.state = "", .points = 10, .paths_max = 64, .sets = false, .causes = true};
+    VerifyOptions formats{.state = "", .points = 10, .paths_max = 64, .sets = false, .formats = true};
+    json denser = json::parse(data->settings_json);
+    denser["lightmaps.texels_per_metre"]["value"] = 16;
+    for (const VerifyOptions& options : {causes, formats}) {
+        expectRefused("{}", options, "no quality");  // no level was cooked into it
+        expectRefused(denser.dump(), options, "pages are not those of this level");
+    }
+    causes.state = "door:front=1";
+    expectRefused(data->settings_json, causes, "closed doors");
 }
 
 }  // namespace

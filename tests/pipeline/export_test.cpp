@@ -222,6 +222,17 @@ TEST(Export, AnEarlierExportGoes) {
     EXPECT_EQ(namesIn(used.path), expected);
 }
 
+// Which has no index that would name its pictures.
+TEST(Export, AnInterruptedExportGoes) {
+    SilentProgress silent;
+    const Folder used, fresh;
+    ASSERT_TRUE(exportPack(exportPackOf(6), used.path, silent));
+    std::filesystem::remove(used.path / "index.json");
+    ASSERT_TRUE(exportPack(exportPackOf(2), used.path, silent));
+    ASSERT_TRUE(exportPack(exportPackOf(2), fresh.path, silent));
+    EXPECT_EQ(namesIn(used.path), namesIn(fresh.path));
+}
+
 TEST(Export, AnIndexMayNameOnlyPictures) {
     SilentProgress silent;
     const Folder out;

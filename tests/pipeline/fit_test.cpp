@@ -227,6 +227,21 @@ TEST(CoarseExposure, NamesTheSetThatAsksForIt) {
     EXPECT_THAT(*coarseExposure(scene, 0x1p-30f), HasSubstr("intensity"));
 }
 
+TEST(FarFromOrigin, IsSaidOfLevelsFarOff) {
+    for (const float at_m : {0.0f, 1500.0f, -5000.0f}) {
+        Scene scene;
+        scene.file = "level.glb";
+        scene.materials.resize(1);
+        scene.meshes.emplace_back();
+        scene.meshes[0].positions_m = {{at_m, 0, 0}, {at_m + 1, 0, 0}, {at_m, 0, 1}};
+        scene.meshes[0].triangles = {{0, 1, 2}};
+        scene.meshes[0].triangle_materials = {0};
+        const auto warning = farFromOrigin(RayScene(scene));
+        EXPECT_EQ(warning.has_value(), at_m == -5000);
+        if (warning) EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("5000 m")));
+    }
+}
+
 // Grids of 64, 27 and 8 probes may have 60 in all: 26 + 26 + 8.
 TEST(LocalGridBudget, TakesFromTheLargest) {
     PackData pack;

@@ -157,6 +157,22 @@ TEST(LevelMeshes, ColourEmissionAndElements) {
         EXPECT_NEAR(leaf.reflectance[i], c * (1 - rs) + rs, 1e-5f);
 }
 
+TEST(LevelMeshes, EachHasTheColourOfItsOwnMaterial) {
+    LevelFile level;
+    std::vector<int> materials;
+    for (const float grey : {0.2f, 0.8f})
+        materials.push_back(level.addMaterial(
+            {{"pbrMetallicRoughness", {{"baseColorFactor", {grey, grey, grey, 1}}, {"metallicFactor", 0}}}}));
+    for (const int i : {0, 1, 0, 1})
+        level.addNode({{"mesh", level.addSquareMesh(materials[static_cast<size_t>(i)])},
+                       {"translation", {2 * static_cast<int>(level.document["nodes"].size()), 0, 0}}});
+    const auto result = build(level);
+    ASSERT_EQ(result.meshes.size(), 4u);
+    const float rs = 0.04f + 0.96f / 21;  // as above
+    for (size_t m = 0; m < 4; ++m)
+        EXPECT_NEAR(result.meshes[m].reflectance[0], (m % 2 ? 0.8f : 0.2f) * (1 - rs) + rs, 1e-5f) << m;
+}
+
 // Vertices are shared within a chart: an engine should not upload six for a square.
 TEST(LevelMeshes, VerticesAreShared) {
     LevelFile level;

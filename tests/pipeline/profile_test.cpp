@@ -66,6 +66,20 @@ TEST(Profile, ExtendsAFileBesideIt) {
     EXPECT_EQ(profile->origin.at("records.threshold"), "desktop");
 }
 
+TEST(Profile, TellsTheFilesThatItExtends) {
+    const TemporaryFolder folder;
+    const auto base = writeText(folder, "base.json", R"({"extends": "handheld"})");
+    const auto middle = writeText(folder, "middle.json", R"({"extends": "base.json"})");
+    const auto top = writeText(folder, "top.json", R"({"extends": "middle.json"})");
+    EXPECT_THAT(filesExtendedBy(top.string()), testing::ElementsAre(middle, base));
+    for (const std::string& none :
+         {base.string(), std::string("console"), std::string("no such"), writeText(folder, "broken.json", "{").string(),
+          writeText(folder, "lost.json", R"({"extends": "gone.json"})").string()})
+        EXPECT_THAT(filesExtendedBy(none), testing::IsEmpty()) << none;
+    const auto circle = writeText(folder, "circle.json", R"({"extends": "circle.json"})");
+    EXPECT_THAT(filesExtendedBy(circle.string()), testing::Each(circle));
+}
+
 TEST(Profile, UnknownKeysAreNamedWithTheNearest) {
     expectBad(R"({"lightmaps": {"page_sice": 512}})", {"'lightmaps.page_sice'", "did you mean 'lightmaps.page_size'?"});
     expectBad(R"({"lightmap": {"page_size": 512}})", {"did you mean 'lightmaps.page_size'?"});

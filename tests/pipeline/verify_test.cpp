@@ -159,6 +159,22 @@ TEST(Verify, AWrongPackIsFoundWrong) {
     EXPECT_TRUE(report->converged);
 }
 
+// The standard error falls with the root of the paths: a sixteenth of them, four times the noise.
+TEST(Verify, FewPathsAreFewForSetsToo) {
+    const Scene scene = furnace();
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    const RayScene rays(scene);
+    const auto points = choosePoints(*pack, rays, {}, 60, 1);
+    ASSERT_EQ(points.size(), 60u);
+    SilentProgress progress;
+    const auto few = setEffect(rays, *pack, points, 0, 1, progress, 16);
+    const auto more = setEffect(rays, *pack, points, 0, 1, progress, 256);
+    ASSERT_TRUE(few && more);
+    ASSERT_GT(more->reference_noise, 0);
+    EXPECT_NEAR(few->reference_noise / more->reference_noise, 4, 2);
+}
+
 // A set that a game can only dim: without a state, pack and reference show it at its maximum.
 TEST(Verify, ASetOfSmallMaximumIsHeldAgainstTheSame) {
     Scene scene = furnace();

@@ -5,6 +5,7 @@
 #include <pipeline/cooked_level.h>
 #include <pipeline/small_level.h>
 #include <pipeline/write_level.h>
+#include <write/glb_document.h>
 #include <write/pack_writer.h>
 
 #include <cstring>
@@ -116,6 +117,20 @@ struct Glb {
         return out;
     }
 };
+
+// Lengths have 32 bits; a lesser limit stands for 4 GiB here.
+TEST(GlbDocument, RefusesWhatIsTooLong) {
+    GlbDocument document;
+    document.json["asset"]["version"] = "2.0";
+    document.addView(std::array<std::byte, 5>{});
+    const auto whole = document.bytes();
+    ASSERT_TRUE(whole) << whole.error().message;
+    EXPECT_TRUE(document.bytes(whole->size()));
+    const auto refused = document.bytes(whole->size() - 1);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::BadInput);
+    EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("{} bytes", whole->size())));
+}
 
 // Two sets that share an emissive material have a copy each while they are baked: the level is the same level.
 TEST(WriteLevel, SetsMayShareAnEmissiveMaterial) {

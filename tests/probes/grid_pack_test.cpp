@@ -68,6 +68,15 @@ TEST(GridPack, EveryFieldComesBack) {
     EXPECT_EQ(b.local[1].first_probe, no_probe);
 }
 
+TEST(GridPack, ALocalGridThatIsNotThereHasNoProbes) {
+    const auto pack = Pack::fromData(gridPack());
+    ASSERT_TRUE(pack);
+    EXPECT_EQ(pack->localGridSlot(0).first_probe, 50u);
+    EXPECT_EQ(pack->localGridSlot(0).counts, (std::array<uint32_t, 3>{2, 3, 2}));
+    for (const uint32_t number : {2u, UINT32_MAX})
+        EXPECT_EQ(pack->localGridSlot(number).counts, (std::array<uint32_t, 3>{0, 0, 0}));
+}
+
 struct Fault {
     const char* name;
     std::function<void(ProbeData&)> apply;
@@ -122,6 +131,15 @@ TEST(GridPack, AllChunksOrNone) {
         ASSERT_FALSE(pack) << type;
         EXPECT_THAT(pack.error().message, testing::HasSubstr(fmt::format("chunk {} is missing", type)));
     }
+}
+
+TEST(GridPack, ACountOfLocalGridsAloneIsRefused) {
+    PackFile file(cook::packBytes(gridPack()));
+    ASSERT_EQ(file.chunk("LGRD").read<uint32_t>(0), 2u);
+    file.chunk("LGRD").bytes.resize(4);
+    const auto pack = Pack::fromBytes(file.bytes(), "test");
+    ASSERT_FALSE(pack);
+    EXPECT_THAT(pack.error().message, testing::HasSubstr("LGRD is malformed"));
 }
 
 // The file lists a tetrahedron's probes; who borders on whom is found when it is read (GridPack.EveryFieldComesBack

@@ -137,6 +137,28 @@ TEST(GridSampler, OutsideTakesTheNearestPointOfTheBox) {
     EXPECT_EQ(sampler.sample({-7, 2, 90}, {0, 1, 0}), sampler.sample({box.min_m[0], 2, box.max_m[2]}, {0, 1, 0}));
 }
 
+// Those of another pack: black rather than what stands behind them in memory.
+TEST(GridSampler, ProbesThatAreNotThereAreBlack) {
+    const Grid g = gradientGrid();
+    const auto pack = Pack::fromData(g.data);
+    ASSERT_TRUE(pack);
+    const auto count = static_cast<uint32_t>(g.data.probes.base.size());
+    const auto all = std::span<const uint32_t>(g.words), fewer = all.first(all.size() - 1);
+    EXPECT_GT(GridSampler(*pack, all).sample({2, 2, 2}, {0, 1, 0})[0], 1);
+    EXPECT_EQ(GridSampler(*pack, fewer).sample({2, 2, 2}, {0, 1, 0})[0], 0);
+    EXPECT_EQ(GridSampler(*pack, {}).radiance({2, 2, 2}).coefficients[0][0], 0);
+    const auto lux = [&](std::span<const uint32_t> words, const ModelSlot& slot) {
+        return GridSampler(*pack, words).sample(slot, {2, 2, 2}, {0, 1, 0})[0];
+    };
+    const ModelSlot last{count - 8, {2, 2, 2}, {}};
+    EXPECT_GT(lux(all, last), 1);
+    EXPECT_EQ(lux(fewer, last), 0);
+    EXPECT_EQ(lux(all, {count - 7, {2, 2, 2}, {}}), 0);
+    EXPECT_EQ(lux(all, {UINT32_MAX, {2, 2, 2}, {}}), 0);
+    EXPECT_EQ(lux(all, {0, {1u << 31, 1u << 31, 4}, {}}), 0);  // as many as make 0 of 64 bits
+    EXPECT_EQ(lux(all, {}), 0);
+}
+
 // A plane through a tetrahedron hides a probe's light from what lies beyond it, and the rest make up for it.
 TEST(GridSampler, WhatAProbeDoesNotSeeItDoesNotLight) {
     Grid g = gradientGrid();

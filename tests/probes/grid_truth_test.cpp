@@ -41,14 +41,16 @@ TEST(GridTruth, TwoRooms) {
     ASSERT_TRUE(pack) << pack.error().message;
     EXPECT_LE(static_cast<double>(pack->data().probes.base.size()), stats.free_volume_m3);
     const double floor_lux = truthFloor(readTruth("two_rooms.free.all_on"));
-    for (const auto& [name, state] : {std::pair("all_on", ""), {"all_off", "all=0"}, {"door_0", "door:mid=1"}}) {
+    for (const auto& [name, state] :
+         {std::pair("all_on", ""), {"all_off", "all=0"}, {"only_first", "all=0,desk=1"}, {"door_0", "door:mid=1"}}) {
         const auto truth = readTruth(std::string("two_rooms.free.") + name);
         const ErrorFigures f = gridErrorAgainst(*pack, state, truth, floor_lux);
         printf("two_rooms %s in the open, at draft: mean %.2f %%, p95 %.2f %%, bias %+.2f %%\n", name, 100 * f.mean,
                100 * f.p95, 100 * f.bias);
         EXPECT_EQ(f.points, truth.size());
-        EXPECT_LE(f.mean, 0.12) << name;
-        EXPECT_LE(f.p95, 0.40) << name;
+        // The goals for our own levels are 8 and 25 %, at final; at draft there is an eighth more noise.
+        EXPECT_LE(f.mean, 0.09) << name;
+        EXPECT_LE(f.p95, 0.28) << name;
     }
 }
 

@@ -208,6 +208,36 @@ TEST(TetrahedronWalk, FindsWhatBruteForceFinds) {
     }
 }
 
+// A tunnel of a kilometre along each axis: from one end to the other it is more tetrahedra than a walk may take, so
+// each must begin near by.
+TEST(TetrahedronWalk, ArrivesEverywhereInALevelOfAKilometre) {
+    for (int axis = 0; axis < 3; ++axis) {
+        Random random(9);
+        const auto across = [&](float along, float side, float up) {
+            glm::vec3 p;
+            p[axis] = along;
+            p[(axis + 1) % 3] = side;
+            p[(axis + 2) % 3] = up;
+            return p;
+        };
+        std::vector<glm::vec3> points;
+        for (int i = 0; i < 6000; ++i) {
+            const auto cell = static_cast<float>(i / 6);
+            points.push_back(across(cell + uniform(random, 0, 0.5f),
+                                    static_cast<float>(i % 3) * 2 + uniform(random, 0, 0.5f),
+                                    static_cast<float>(i % 2) * 2 + uniform(random, 0, 0.5f)));
+        }
+        const GlobalGrid grid = gridOf(points);
+        for (int i = 0; i < 2000; ++i) {
+            const glm::vec3 p = across(uniform(random, 0, 1000), uniform(random, 0, 4), uniform(random, 0, 2));
+            const GridPlace place = locate(grid, {p.x, p.y, p.z});
+            // Within the walk's tolerance, and rounding.
+            const double inside = std::ranges::min(barycentric(grid, grid.tetrahedra[place.tetrahedron], p));
+            ASSERT_GT(inside, -2e-4) << "axis " << axis << " at " << p[axis] << " m";
+        }
+    }
+}
+
 std::vector<glm::vec3> randomPoints(Random& random) {
     const uint32_t kind = pick(random, 0, 5), count = pick(random, 0, 40);
     const float scale = std::exp2(uniform(random, -6, 9));

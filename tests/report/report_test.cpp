@@ -124,6 +124,16 @@ TEST(Report, BudgetsComeFromThePacksSettings) {
     EXPECT_THAT(htmlOf(packOf(dimmer::test::samplePack()), {}), Not(HasSubstr("class=over")));
 }
 
+// A value that nests is no setting, and following it would exhaust the stack.
+TEST(Report, ListsTheSettingsThatAreSome) {
+    PackData data = dimmer::test::samplePack();
+    data.settings_json = R"({"lightmaps.page_size": {"value": 512, "from": "mine.json"}, "hostile": {"value": )" +
+                         std::string(200000, '[') + std::string(200000, ']') + R"(, "from": "x"}, "other": 7})";
+    const std::string html = htmlOf(packOf(std::move(data)), {});
+    EXPECT_THAT(html, AllOf(HasSubstr("<td>lightmaps.page_size<td>512<td>&quot;mine.json&quot;"),
+                            Not(HasSubstr("hostile")), Not(HasSubstr("<td>other"))));
+}
+
 TEST(Report, VerifyAndItsHeatMaps) {
     const Pack pack = packOf(dimmer::test::samplePack());
     const test::TemporaryFolder folder;

@@ -1,9 +1,14 @@
+#include <cpu/worker_pool.h>
 #include <dimmer/cpu_runtime.h>
 #include <format/texel.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "pages.h"
+
+#include <cstdlib>
+#include <new>
 
 namespace dimmer {
 namespace {
@@ -130,6 +135,23 @@ TEST(CpuRuntime, HostileRecordsNeverPutInfinityOrNanIntoThePages) {
     ASSERT_TRUE(runtime.apply("set0=65536,set1=0.00001,door:door0=0.5"));
     runtime.update();
     expectFinite();
+}
+
+// In a process of its own: a pool where no memory is left, whose work the caller then does alone.
+[[noreturn]] void workWithoutMemory() {
+    constexpr rlimit no_more{0, 0};
+    setrlimit(RLIMIT_AS, &no_more);
+    for (size_t bytes = 1 << 20; bytes >= 8; bytes /= 2)
+        while (::operator new(bytes, std::nothrow)) {
+        }
+    uint32_t calls = 0;
+    WorkerPool pool(8);
+    pool.run([&](uint32_t) { ++calls; });
+    std::_Exit(pool.threads() == 1 && calls == 1 ? 0 : 2);
+}
+
+TEST(WorkerPoolDeathTest, WithoutMemoryTheCallerWorksAlone) {
+    EXPECT_EXIT(workWithoutMemory(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

@@ -71,6 +71,27 @@ TEST(TexelLimits, RecordsThatAreNeverLoadedTogetherNeedNoRoomTogether) {
     }
 }
 
+class TexelBuffers : public test::GpuTest {};
+
+// Before any memory is taken; the layers would name a view of too many texels.
+TEST_F(TexelBuffers, OfMoreTexelsThanTheDeviceReadsAreRefused) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(device().context().physical_device, &properties);
+    const uint64_t texels_max = properties.limits.maxTexelBufferElements;
+    const std::pair<VkFormat, uint64_t> texel_bytes[] = {{VK_FORMAT_R8G8_UINT, 2},
+                                                         {VK_FORMAT_R16_UINT, 2},
+                                                         {VK_FORMAT_R32_UINT, 4},
+                                                         {VK_FORMAT_R32G32_UINT, 8},
+                                                         {VK_FORMAT_R32G32B32A32_UINT, 16}};
+    for (const auto& [format, bytes] : texel_bytes) {
+        EXPECT_TRUE(createTexelBuffer(device().context(), 1000 * bytes, format, MemoryUse::Device));
+        const auto refused = createTexelBuffer(device().context(), (texels_max + 1) * bytes, format, MemoryUse::Device);
+        ASSERT_FALSE(refused) << format;
+        EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+        EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("{} texels", texels_max + 1)));
+    }
+}
+
 class RecordsTest : public test::GpuTest {
    protected:
     static void expectEqualPages(Runtime& gpu, const CpuRuntime& cpu) {

@@ -106,6 +106,20 @@ TEST(SampleLightmap, ATexelWithoutDirectionPullsItsNeighbourTowardsNone) {
     EXPECT_NEAR(e[0], r + n_x * b_x + (1 - r) * n_z, 1e-5);
 }
 
+// Those of another pack: black rather than what stands behind them in memory.
+TEST(SampleLightmap, PagesOfFewerTexelsAreDark) {
+    const Pack pack = pageOf(4, 2);
+    const std::vector<uint32_t> irradiance(8, encodeR11G11B10(2, 2, 2)), direction(8, no_direction);
+    const auto at = [&](size_t irradiance_texels, size_t direction_texels) {
+        return sampleLightmap(pack, std::span(irradiance).first(irradiance_texels),
+                              std::span(direction).first(direction_texels), 0, {0.5f, 0.5f}, {0, 0, 1})[0];
+    };
+    EXPECT_EQ(at(8, 8), 1);
+    EXPECT_EQ(at(7, 8), 0);
+    EXPECT_EQ(at(8, 7), 0);
+    EXPECT_EQ(at(0, 0), 0);
+}
+
 TEST(SampleLightmap, AnUnknownPageIsDark) {
     const Pack pack = pageOf(1, 1);
     const std::array texel{encodeR11G11B10(1, 1, 1)}, direction{no_direction};

@@ -278,6 +278,21 @@ TEST(SceneBadInput, RequiredExtensionsMustBeKnown) {
     expectBadInput(level.import(), {"KHR_draco_mesh_compression"});
 }
 
+TEST(SceneBadInput, ExtensionsThatAreMissedAreWarnedOf) {
+    LevelFile level = LevelFile::withFloor();
+    level.document["extensionsUsed"] = {"EXT_mesh_gpu_instancing",    "KHR_materials_pbrSpecularGlossiness",
+                                        "KHR_materials_transmission", "ACME_gravel",
+                                        "KHR_materials_ior",          "KHR_xmp_json_ld",
+                                        "KHR_lights_punctual"};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 4u);
+    expectWarning(*scene, {"'EXT_mesh_gpu_instancing'", "Export its instances as nodes"});
+    expectWarning(*scene, {"'KHR_materials_pbrSpecularGlossiness'", "white metal", "Convert"});
+    expectWarning(*scene, {"'KHR_materials_transmission'", "opaque", "BLEND"});
+    expectWarning(*scene, {"'ACME_gravel'", "ignored"});
+}
+
 // Whatever the bytes: a scene or a message.
 void expectAnAnswer(const std::vector<uint8_t>& bytes) {
     const auto scene = importBytes("level.glb", bytes);

@@ -120,6 +120,36 @@ TEST(SceneElements, AMaterialsSetTakesOnlyThatMaterial) {
     EXPECT_EQ(scene->meshes[2].triangle_materials[0], static_cast<uint32_t>(switched));
 }
 
+// A lamp whose mesh glows too: the material's keys are about its emission, not about the light.
+TEST(SceneElements, AMaterialDoesNotSpeakForALight) {
+    LevelFile level = levelWithLamp(json::object());
+    const int glow = addGlow(level);
+    json& material = level.document["materials"][static_cast<size_t>(glow)];
+    material["extras"] = {{"dimmer_light_set", "sign"}, {"dimmer_bake", "full"}};
+    level.node(1)["mesh"] = level.addSquareMesh(glow);
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_FALSE(scene->lights[0].light_set);
+    EXPECT_EQ(scene->lights[0].bake, BakeMode::Indirect);
+    EXPECT_EQ(scene->meshes[1].light_set, 0u);
+    expectWarning(*scene, {"node 'lamp'", "'dimmer_bake'"});
+    // Then nothing is left that the set could dim.
+    material.erase("emissiveFactor");
+    expectBadInput(level.import(), {"node 'lamp'", "by material 'glow'", "'sign'"});
+}
+
+TEST(SceneElements, ANodesMaxWeightHoldsForItsMaterialsSet) {
+    LevelFile level = LevelFile::withFloor();
+    const int glow = addGlow(level);
+    level.document["materials"][static_cast<size_t>(glow)]["extras"] = {{"dimmer_light_set", "sign"}};
+    level.addNode({{"name", "panel"}, {"mesh", level.addSquareMesh(glow)}, {"extras", {{"dimmer_max_weight", 4}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->light_sets.size(), 1u);
+    EXPECT_EQ(scene->light_sets[0].max_weight, 4.0f);
+    EXPECT_TRUE(scene->warnings.empty());
+}
+
 TEST(SceneElements, ASetWithoutLightsIsRefused) {
     LevelFile empty = LevelFile::withFloor();
     empty.addNode({{"name", "lost"}, {"extras", {{"dimmer_light_set", "hall"}}}});
@@ -216,6 +246,30 @@ TEST(SceneElements, LeavesOfOneDoorHavePosesOfTheirOwn) {
     EXPECT_NEAR(glm::distance(turned(1), glm::dvec4(-1, 0, -1, 1)), 0, 1e-12);
     EXPECT_NEAR(glm::distance(turned(2), glm::dvec4(1, 0, -1, 1)), 0, 1e-12);
     EXPECT_EQ(turned(3), turned(2));
+}
+
+// Nodes below one of the same door move with it, and by their own pose before; another door's move by their own alone.
+TEST(SceneElements, PosesOfOneDoorAddUpDownTheTree) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(0);
+    const double s = std::sqrt(0.5);
+    const auto add = [&](const char* name, const json& extras, int parent) {
+        return level.addNode({{"name", name}, {"mesh", mesh}, {"translation", {1, 0, 0}}, {"extras", extras}}, parent);
+    };
+    const json step = {1, 0, 0};
+    const int leaf = add(
+        "leaf", {{"dimmer_door", "front"}, {"dimmer_door_open", "pose"}, {"dimmer_door_rotation", {0, s, 0, s}}}, -1);
+    add("panel", {{"dimmer_door", "front"}}, leaf);
+    add("bolt", {{"dimmer_door", "front"}, {"dimmer_door_translation", step}}, leaf);
+    add("flap", {{"dimmer_door", "flap"}, {"dimmer_door_open", "pose"}, {"dimmer_door_translation", step}}, leaf);
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->meshes.size(), 5u);
+    const auto moved = [&](size_t m) { return scene->meshes[m].open_from_closed * glm::dvec4(2, 0, 0, 1); };
+    // A quarter turn about +Y through (1, 0, 0) takes what lies n metres towards +X from there n metres towards -Z.
+    EXPECT_NEAR(glm::distance(moved(2), glm::dvec4(1, 0, -1, 1)), 0, 1e-12);
+    EXPECT_NEAR(glm::distance(moved(3), glm::dvec4(1, 0, -2, 1)), 0, 1e-12);
+    EXPECT_NEAR(glm::distance(moved(4), glm::dvec4(3, 0, 0, 1)), 0, 1e-12);
 }
 
 TEST(SceneElements, APoseThatIsNotStatedIsWarnedOf) {

@@ -222,6 +222,34 @@ TEST(SceneGeometry, ThinTrianglesOfRealLevelsStay) {
     EXPECT_EQ(scene->meshes.size(), 2u);
 }
 
+// Neither is applied; what is dynamic is where the game puts it.
+TEST(SceneGeometry, JointsAndShapeKeysAreWarnedOf) {
+    LevelFile level = LevelFile::withFloor();
+    const int mesh = level.addSquareMesh(0), node = level.addNode({{"name", "guard"}, {"mesh", mesh}});
+    const auto warnings = [&] {
+        const auto scene = level.import();
+        return scene ? scene->warnings.size() : SIZE_MAX;
+    };
+    level.document["skins"] = json::array({{{"joints", {0}}, {"inverseBindMatrices", 0}}});
+    level.node(node)["skin"] = 0;
+    auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 1u);
+    expectWarning(*scene, {"node 'guard'", "joints", "Apply the armature"});
+    level.node(node)["extras"] = {{"dimmer_dynamic", 1}};
+    EXPECT_EQ(warnings(), 0u);
+
+    level.node(node).erase("skin");
+    level.node(node).erase("extras");
+    level.document["meshes"][static_cast<size_t>(mesh)]["weights"] = {0, 0.5};
+    scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 1u);
+    expectWarning(*scene, {"node 'guard'", "morph targets", "Apply the shape keys"});
+    level.node(node)["weights"] = {0, 0};  // in place of the mesh's
+    EXPECT_EQ(warnings(), 0u);
+}
+
 TEST(SceneGeometry, TextureCoordinates) {
     LevelFile level = LevelFile::withFloor();
     const int mesh = level.addSquareMesh(0);

@@ -54,8 +54,8 @@ class CpuRuntime : public LightState {
 };
 
 // Irradiance in lux, bilinear, of pages as above (from either runtime). `uv` is 0..1 over the page; `normal_tangent`
-// the unit normal in the texel's tangent frame, (0,0,1) for the surface's own. Thread-safe. The CPU twin of
-// dimmer_lightmap_irradiance in sample.glsl.
+// the unit normal in the texel's tangent frame, (0,0,1) for the surface's own. Black where the pack has no such page or
+// the pages hold fewer texels than its own. Thread-safe. The CPU twin of dimmer_lightmap_irradiance in sample.glsl.
 std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> irradiance_pages,
                                     std::span<const uint32_t> direction_pages, uint32_t page, std::array<float, 2> uv,
                                     std::array<float, 3> normal_tangent);

@@ -129,7 +129,7 @@ typedef struct dimmer_placed_model {
     int moves;                       /* 0: it stands, and `slot` says where its probes are; else add it to the lights */
     dimmer_model_slot slot;
     float world_from_model[12]; /* rows of a rigid 3 x 4 matrix, metres, the translation last */
-    float min_m[3], max_m[3];   /* its box, model space */
+    float min_m[3], max_m[3];   /* its box, model space; zeros where it has no meshes */
 } dimmer_placed_model;
 
 dimmer_result dimmer_pack_get_model(const dimmer_pack* pack, uint32_t index, dimmer_placed_model* model);

@@ -39,7 +39,7 @@ struct PlacedModel {
     uint32_t first_mesh = 0, mesh_count = 0;      // of Pack::modelMeshes(); none: a place for things that move
     std::optional<uint32_t> local_grid;           // of Pack::localGridSlot(); empty: it moves, see LightState::addModel
     Transform world_from_model;                   // rigid; of what moves, as the level has it
-    std::array<float, 3> min_m = {}, max_m = {};  // its box, model space
+    std::array<float, 3> min_m = {}, max_m = {};  // its box, model space; zeros where it has no meshes
 };
 
 // Positions are exact to half of 1/65535 of the box's side; normals to 0.004 degrees.

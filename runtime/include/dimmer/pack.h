@@ -89,7 +89,8 @@ class Pack {
     // What light grids light: models that stand, models that move, and empty places for such.
     std::span<const PlacedModel> models() const;
     std::span<const ModelMesh> modelMeshes() const;
-    // Where the probes of PlacedModel::local_grid are, for the same shading as that of models that move.
+    // Where the probes of PlacedModel::local_grid are, for the same shading as that of models that move. Of a number
+    // that the pack does not have: a slot of 0 x 0 x 0 probes.
     ModelSlot localGridSlot(uint32_t local_grid) const;
     uint32_t pageCount() const;
     uint32_t pageWidth() const;

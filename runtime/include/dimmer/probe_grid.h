@@ -30,7 +30,8 @@ struct GridHint {
 
 // Reads `probes`, the blended probes of a runtime (CpuRuntime::probes(), Runtime::Pages::probes), which must outlive
 // it. Thread-safe as long as nobody updates them. Costs some hundred nanoseconds a query. A point outside the level
-// gets the light of the grid's nearest point; with no global grid all is black.
+// gets the light of the grid's nearest point; with no global grid all is black, and so is what reads probes that are
+// not among `probes`, as with those of another pack.
 class GridSampler {
    public:
     GridSampler(const Pack& pack, std::span<const uint32_t> probes) : pack_(pack), probes_(probes) {}
