@@ -32,7 +32,8 @@ std::optional<std::string> farFromOrigin(const RayScene& rays) {
     const float most_m = std::max({farthest.x, farthest.y, farthest.z});
     if (most_m <= far_m) return {};
     return fmt::format(
-        "{}: reaches {:.0f} m from the origin: beyond {:.0f} m walls are placed too coarsely to be lit rightly; move the "
+        "{}: reaches {:.0f} m from the origin: beyond {:.0f} m walls are placed too coarsely to be lit rightly; move "
+        "the "
         "level to the origin, or cook it in parts",
         rays.scene().file, most_m, far_m);
 }
