@@ -76,7 +76,9 @@ int report(const Error& error) {
 }
 
 Expected<std::string> readText(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
+    std::error_code ignored;
+    // A folder can be opened, and throws when it is read.
+    std::ifstream file(std::filesystem::is_directory(path, ignored) ? std::string() : path, std::ios::binary);
     const std::string text(std::istreambuf_iterator<char>(file), {});
     if (!file.is_open() || file.bad()) return fail(ErrorCode::Io, fmt::format("{}: cannot be read.", path));
     return text;

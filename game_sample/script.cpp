@@ -63,7 +63,7 @@ std::optional<Number> toNumber(std::string_view word) {
 std::string_view withoutComment(std::string_view text) {
     bool quoted = false, between_words = true;
     for (size_t i = 0; i < text.size(); ++i) {
-        if (text[i] == '"') quoted = !quoted;
+        if (text[i] == '"' && (quoted || between_words)) quoted = !quoted;
         if (text[i] == '#' && between_words && !quoted) return text.substr(0, i);
         between_words = text[i] == ' ' || text[i] == '\t';
     }

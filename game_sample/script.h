@@ -1,4 +1,5 @@
-// What the sample plays: a text file that a person can edit. One command per line, `#` starts a comment.
+// What the sample plays: a text file that a person can edit. One command per line; a word that begins with
+// `#` starts a comment.
 //
 //     size WIDTH HEIGHT                            pixels; default 960 540
 //     frames N                                     default: one second past the last step

@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.footer(
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 3 over budget, "
-        "4 error above --max-error, 130 interrupted.\n"
+        "4 error above --max-error, 130 interrupted (SIGTERM 143, SIGHUP 129).\n"
         "No command writes over a file that it reads; what it is to write is looked at before the work.\n"
         "`dimmer COMMAND --help` explains a command and gives an example.");
     int exit_code = exit_done;

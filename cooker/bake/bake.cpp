@@ -249,8 +249,8 @@ class Bake {
 
     void warnOfLocalGrids() {
         if (std::ranges::all_of(rays_.scene().models, &SceneModel::moves)) return;
-        auto found = gatherer_ ? warningsOfLocalGrids(rays_, gatherer_->models())
-                               : warningsOfLocalGrids(rays_, ModelReceivers(rays_));
+        auto found = gatherer_ ? warningsOfLocalGrids(rays_, gatherer_->models().places())
+                               : warningsOfLocalGrids(rays_, probePlaces(rays_));
         std::ranges::move(found, std::back_inserter(baked_.warnings));
     }
 

@@ -55,8 +55,8 @@ class RayEnds {
 
     // 0: nothing is remembered.
     size_t rows() const { return rows_; }
-    // So many rays of each row are remembered at most: of a large level fewer, or they would be most of a cook's memory
-    // and push all else out of the cache.
+    // So many rays of each row are worth remembering for the final gather: of a large level fewer, or they would be
+    // most of a cook's memory and push all else out of the cache.
     uint32_t keptMax() const;
     // Replaces `out`. Thread-safe.
     void get(size_t row, RowEnds& out) const;

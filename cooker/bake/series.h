@@ -41,7 +41,7 @@ struct Series {
 // at least series_rays each.
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
-// Only what arrives of each term, as TermReport::energy has it, lm. Rougher: of each receiver one point sees each lamp.
+// Only what arrives of each term, as TermReport::energy has it, lm. Rougher: of each texel one point sees each lamp.
 std::vector<double> termFlux(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                              std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
 

@@ -36,65 +36,74 @@ void forEachBlock(size_t rows, Visit&& visit) {
                       [&](size_t b) { visit(b * rows_per_block, std::min(rows, (b + 1) * rows_per_block)); });
 }
 
-// Compressed rows: row i holds the terms that reach receiver i, ascending.
+// Compressed rows: row i holds the terms that reach receiver i, ascending. Each block of rows has memory of its own:
+// they are filled in parallel, and never copied into one.
 template <class Entry>
 class Sparse {
    public:
-    std::span<const Entry> row(size_t i) const { return {entries_.data() + first_[i], first_[i + 1] - first_[i]}; }
+    std::span<const Entry> row(size_t i) const {
+        const size_t begin = i % rows_per_block == 0 ? 0 : ends_[i];
+        return {blocks_[i / rows_per_block].data() + begin, ends_[i + 1] - begin};
+    }
     // Whether a row has entries, from a bit of it: of a light set alone most rows have none, and rays end anywhere.
-    bool any(size_t i) const { return any_[i / 64] >> i % 64 & 1; }
+    bool any(size_t i) const { return any_[i / rows_per_word] >> i % rows_per_word & 1; }
     // Begins to load a row that is asked for soon.
     void prefetch(size_t i) const {
         if (!any(i)) return;
         constexpr size_t line_bytes = 64, lines_max = 4;
-        const auto* line = reinterpret_cast<const char*>(entries_.data() + first_[i]);
-        const auto* end = reinterpret_cast<const char*>(entries_.data() + first_[i + 1]);
+        const std::span<const Entry> entries = row(i);
+        const auto* line = reinterpret_cast<const char*>(entries.data());
+        const auto* end = reinterpret_cast<const char*>(entries.data() + entries.size());
         for (size_t n = 0; n < lines_max && line < end; ++n, line += line_bytes) __builtin_prefetch(line);
     }
-    size_t rows() const { return first_.size() - 1; }
-    size_t entryCount() const { return entries_.size(); }
-    size_t bytes() const { return (first_.size() + any_.size()) * sizeof(uint64_t) + entries_.size() * sizeof(Entry); }
+    size_t rows() const { return ends_.size() - 1; }
+    size_t entryCount() const {
+        size_t count = 0;
+        for (const auto& block : blocks_) count += block.size();
+        return count;
+    }
 
     // change(entry) for every entry, in parallel.
     void forEach(auto&& change) {
-        tbb::parallel_for(size_t{0}, blockCount(entries_.size()), [&](size_t b) {
-            const size_t end = std::min(entries_.size(), (b + 1) * rows_per_block);
-            for (size_t i = b * rows_per_block; i < end; ++i) change(entries_[i]);
+        tbb::parallel_for(size_t{0}, blocks_.size(), [&](size_t b) {
+            for (Entry& entry : blocks_[b]) change(entry);
         });
     }
 
     // Collects rows block by block; blocks may be filled in parallel, the result does not depend on how.
     class Builder {
        public:
-        explicit Builder(size_t rows) : rows_(rows), first_(rows + 1), parts_(blockCount(rows)) {}
-
-        // Rows of one block must come in order.
-        void put(size_t row, std::span<const Entry> entries) {
-            auto& part = parts_[row / rows_per_block];
-            part.insert(part.end(), entries.begin(), entries.end());
-            first_[row + 1] = entries.size();
+        explicit Builder(size_t rows) {
+            out_.ends_ = std::vector<uint32_t>(rows + 1);
+            out_.any_ = std::vector<uint64_t>(rows / rows_per_word + 1);
+            out_.blocks_ = std::vector<std::vector<Entry>>(blockCount(rows));
         }
 
+        // Rows of one block must come in order; those left out are empty.
+        void put(size_t row, std::span<const Entry> entries) {
+            auto& block = out_.blocks_[row / rows_per_block];
+            block.insert(block.end(), entries.begin(), entries.end());
+            out_.ends_[row + 1] = static_cast<uint32_t>(block.size());
+        }
+
+        // No more comes of a row's block: gives back what memory it does not need.
+        void close(size_t row) { out_.blocks_[row / rows_per_block].shrink_to_fit(); }
+
         Sparse finish() {
-            Sparse out;
-            out.first_ = std::move(first_);
-            out.any_.resize(rows_ / 64 + 1);
-            for (size_t i = 0; i < rows_; ++i) {
-                out.any_[i / 64] |= uint64_t{out.first_[i + 1] > 0} << i % 64;
-                out.first_[i + 1] += out.first_[i];
-            }
-            out.entries_.reserve(out.first_[rows_]);
-            for (auto& part : parts_) {
-                out.entries_.insert(out.entries_.end(), part.begin(), part.end());
-                part = {};
-            }
-            return out;
+            forEachBlock(out_.rows(), [&](size_t begin, size_t end) {
+                close(begin);
+                uint32_t last = 0;
+                for (size_t i = begin; i < end; ++i) {
+                    uint32_t& at = out_.ends_[i + 1];
+                    out_.any_[i / rows_per_word] |= uint64_t{at > last} << i % rows_per_word;
+                    last = at = std::max(at, last);
+                }
+            });
+            return std::move(out_);
         }
 
        private:
-        size_t rows_;
-        std::vector<uint64_t> first_;
-        std::vector<std::vector<Entry>> parts_;
+        Sparse out_;
     };
 
     // `fill(begin, end, emit)` calls emit(entries) once for every row of its range, in order. Ranges run in parallel.
@@ -104,14 +113,18 @@ class Sparse {
         forEachBlock(rows, [&](size_t begin, size_t end) {
             size_t row = begin;
             fill(begin, end, [&](std::span<const Entry> entries) { builder.put(row++, entries); });
+            builder.close(begin);
         });
         return builder.finish();
     }
 
    private:
-    std::vector<uint64_t> first_ = {0};
-    std::vector<uint64_t> any_;  // a bit per row
-    std::vector<Entry> entries_;
+    static constexpr size_t rows_per_word = 64;
+    static_assert(rows_per_block % rows_per_word == 0, "blocks share no word");
+
+    std::vector<uint32_t> ends_ = {0};  // per row, and a 0 before: where its entries end within its block
+    std::vector<uint64_t> any_;         // a bit per row
+    std::vector<std::vector<Entry>> blocks_;
 };
 
 using SparseLight = Sparse<TermLight>;

@@ -103,14 +103,15 @@ template <class Entry>
 void putRows(ByteWriter& out, const Sparse<Entry>& light) {
     std::vector<uint16_t> counts;
     std::vector<uint32_t> terms;  // a level with many doors has more than 65,535
-    std::vector<float> columns(light.entryCount() * stored_floats<Entry>);
+    const size_t count = light.entryCount();
+    std::vector<float> columns(count * stored_floats<Entry>);
     size_t n = 0;
     for (size_t i = 0; i < light.rows(); ++i) {
         counts.push_back(static_cast<uint16_t>(light.row(i).size()));
         for (const Entry& l : light.row(i)) {
             terms.push_back(l.term);
             const auto values = std::bit_cast<std::array<float, stored_floats<Entry>>>(stored(l));
-            for (size_t f = 0; f < values.size(); ++f) columns[f * light.entryCount() + n] = values[f];
+            for (size_t f = 0; f < values.size(); ++f) columns[f * count + n] = values[f];
             ++n;
         }
     }

@@ -50,26 +50,29 @@ class Padding {
     }
 
     void growRings(const Chart& c) {
-        constexpr std::array<std::array<int, 2>, 8> neighbours = {
-            {{-1, 0}, {1, 0}, {0, -1}, {0, 1}, {-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
+        using Steps = std::array<std::array<int, 2>, 4>;
+        // What lies beside a texel comes before what lies across its corner, from whichever texel it is asked for.
+        constexpr std::array<Steps, 2> passes = {
+            {{{{-1, 0}, {1, 0}, {0, -1}, {0, 1}}}, {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}}}};
         std::vector<std::array<uint32_t, 2>> front, next;
         for (uint32_t y = c.y; y < c.y + c.height; ++y)
             for (uint32_t x = c.x; x < c.x + c.width; ++x)
                 if (texels_.receiver_at[index(c.page, x, y)] != no_index) front.push_back({x, y});
         for (int ring = 1; !front.empty(); ++ring) {
             next.clear();
-            for (auto [x, y] : front)
-                for (auto [dx, dy] : neighbours) {
-                    const auto nx = static_cast<uint32_t>(static_cast<int>(x) + dx);
-                    const auto ny = static_cast<uint32_t>(static_cast<int>(y) + dy);
-                    if (nx - c.x >= c.width || ny - c.y >= c.height) continue;
-                    uint32_t& receiver = texels_.receiver_at[index(c.page, nx, ny)];
-                    if (receiver != no_index) continue;
-                    receiver = texels_.receiver_at[index(c.page, x, y)];
-                    next.push_back({nx, ny});
-                    if (ring <= fill_rings && touchesCovered(c, nx, ny))
-                        texels_.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
-                }
+            for (const Steps& steps : passes)
+                for (auto [x, y] : front)
+                    for (auto [dx, dy] : steps) {
+                        const auto nx = static_cast<uint32_t>(static_cast<int>(x) + dx);
+                        const auto ny = static_cast<uint32_t>(static_cast<int>(y) + dy);
+                        if (nx - c.x >= c.width || ny - c.y >= c.height) continue;
+                        uint32_t& receiver = texels_.receiver_at[index(c.page, nx, ny)];
+                        if (receiver != no_index) continue;
+                        receiver = texels_.receiver_at[index(c.page, x, y)];
+                        next.push_back({nx, ny});
+                        if (ring <= fill_rings && touchesCovered(c, nx, ny))
+                            texels_.fills.push_back({TexelAddress::pack(c.page, nx, ny), receiver});
+                    }
             front.swap(next);
         }
     }

@@ -155,14 +155,20 @@ TangentFrame receiverFrame(uint32_t face) {
     return frame;
 }
 
-ModelReceivers::ModelReceivers(const RayScene& rays) : rays_(rays) {
+ProbePlaces probePlaces(const RayScene& rays) {
+    return ModelReceivers(rays, false).places();
+}
+
+ModelReceivers::ModelReceivers(const RayScene& rays) : ModelReceivers(rays, true) {}
+
+ModelReceivers::ModelReceivers(const RayScene& rays, bool with_receivers) : rays_(rays) {
     const auto& models = rays.scene().models;
     if (std::ranges::none_of(models, [](const SceneModel& m) { return !m.moves; })) return;
     models_.resize(models.size());
     for (uint32_t m = 0; m < models.size(); ++m) {
         if (models[m].moves) continue;
         placeProbes(m);
-        makeReceivers(m);
+        if (with_receivers) makeReceivers(m);
     }
     first_point_.push_back(static_cast<uint32_t>(points_.size()));
 }

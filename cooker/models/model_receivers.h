@@ -65,6 +65,8 @@ class ModelReceivers {
     uint32_t modelOfProbe(uint32_t probe) const { return model_of_probe_[probe]; }
 
    private:
+    friend ProbePlaces probePlaces(const RayScene& rays);
+    ModelReceivers(const RayScene& rays, bool with_receivers);
     struct Model {
         uint32_t first_probe = 0, first_receiver = 0;
         std::array<uint32_t, receiver_normals> slots{};  // of the normals that the model's surface is near to
@@ -83,6 +85,9 @@ class ModelReceivers {
     ProbePlaces places_;
     std::vector<uint32_t> model_of_probe_;
 };
+
+// ModelReceivers::places() alone.
+ProbePlaces probePlaces(const RayScene& rays);
 
 // Faces from here on are not of the charts: the normals of receivers, and no_face.
 inline constexpr uint32_t first_receiver_face = 0xffffff00u;

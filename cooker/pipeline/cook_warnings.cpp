@@ -26,15 +26,15 @@ std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
 }
 
 std::optional<std::string> farFromOrigin(const RayScene& rays) {
-    // A step of floats is 0.24 mm from here on, and points of surfaces lie 0.5 mm off them.
+    // A step of floats is 0.24 mm from here on; points of surfaces lie 0.5 mm off them, the reference's 0.2 mm.
     constexpr float far_m = 2048;
     const glm::vec3 farthest = glm::max(glm::abs(rays.boundsMin()), glm::abs(rays.boundsMax()));
     const float most_m = std::max({farthest.x, farthest.y, farthest.z});
     if (most_m <= far_m) return {};
     return fmt::format(
-        "{}: reaches {:.0f} m from the origin: beyond {:.0f} m walls are placed too coarsely to be lit rightly; move "
-        "the "
-        "level to the origin, or cook it in parts",
+        "{}: reaches {:.0f} m from the origin: beyond {:.0f} m walls are placed ever more coarsely, and lit less "
+        "rightly; "
+        "put the level's middle at the origin, or cook it in parts",
         rays.scene().file, most_m, far_m);
 }
 

@@ -13,8 +13,8 @@ namespace dimmer::cook {
 // black.
 std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
 
-// Coordinates are floats: so far from the origin walls are rounded by more than what keeps rays off them, and are lit
-// from behind themselves.
+// Coordinates are floats: far from the origin a step of theirs comes near what keeps rays off walls, until these are
+// lit from behind themselves.
 std::optional<std::string> farFromOrigin(const RayScene& rays);
 
 }  // namespace dimmer::cook

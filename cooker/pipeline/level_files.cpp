@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -44,9 +45,14 @@ std::vector<std::filesystem::path> filesNamedBy(const std::filesystem::path& lev
     if (!bytes) return {};
     std::vector<std::filesystem::path> files;
     std::string key;
+    std::optional<int> extras_depth;  // within somebody's own properties: of these only the sky's is a file's
     const auto visit = [&](int depth, Event event, const nlohmann::json& parsed) {
-        if (event == Event::key) key = parsed.get<std::string>();
-        if (event == Event::value && parsed.is_string())
+        if (event == Event::key) {
+            key = parsed.get<std::string>();
+            if (extras_depth && depth <= *extras_depth) extras_depth.reset();
+            if (!extras_depth && key == "extras") extras_depth = depth;
+        }
+        if (event == Event::value && parsed.is_string() && (!extras_depth || key != "uri"))
             addFile(level.parent_path(), key, parsed.get_ref<const std::string&>(), files);
         return depth < level_nesting_max;
     };

@@ -137,7 +137,7 @@ class LevelWriter {
         const auto warn = [&](const std::string& what) {
             warnings_.push_back(fmt::format("node '{}': {}", n.value("name", fmt::format("node_{}", node)), what));
         };
-        if (n.contains("skin")) warn("its skin is not written; the mesh is in its rest pose");
+        if (n.contains("skin")) warn("its skin is not written; the mesh stands as its node places it");
         std::set<std::string> lost;
         for (const Json& primitive : original_mesh_[node]["primitives"]) {
             for (const auto& attribute : primitive["attributes"].items())

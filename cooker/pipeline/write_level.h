@@ -13,7 +13,7 @@ namespace dimmer::cook {
 // they are; the geometry is the cooked one, cut where the cook cut it: POSITION, NORMAL, TEXCOORD_0 as the base colour
 // wants it, and in TEXCOORD_1 the final UVs over the page that the mesh's extras name as "lightmap_page". A node whose
 // charts lie on several pages gets a child for each further one. Both sides of a double-sided surface have texels of
-// their own: they become two single-sided ones. Skins and morph targets are left in their rest pose. `warnings` gets
+// their own: they become two single-sided ones. Skins and morph targets are left out. `warnings` gets
 // what was lost. `pack` must be what was cooked from the level.
 Expected<void> writeLevel(const std::filesystem::path& level, const PackData& pack, const std::filesystem::path& out,
                           std::vector<std::string>& warnings);

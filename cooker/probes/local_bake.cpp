@@ -186,10 +186,10 @@ Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& se
     });
 }
 
-std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ModelReceivers& models) {
+std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ProbePlaces& places) {
     std::vector<std::string> warnings;
     const Scene& scene = rays.scene();
-    const auto& source = models.places().source;
+    const auto& source = places.source;
     size_t first = 0;
     for (uint32_t m = 0; m < scene.models.size(); ++m) {
         const SceneModel& model = scene.models[m];

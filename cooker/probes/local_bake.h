@@ -14,7 +14,7 @@ inline constexpr uint32_t fitted_probes_max = 128;
 Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
                                       std::span<const uint8_t> groups, Progress& progress, uint64_t& rays);
 // What is wrong with standing models' grids: by the geometry alone, so that a cook whose light is all cached says it
-// too. `models`: of the same rays.
-std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ModelReceivers& models);
+// too. `places`: of the same rays.
+std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ProbePlaces& places);
 
 }  // namespace dimmer::cook

@@ -271,7 +271,9 @@ class Report {
         body_ += "<h2>Error on the pages</h2>\n<p class=dim>Points: blue too dark, white exact, red too bright.</p>\n";
         for (uint32_t page = 0; page < d_.page_count; ++page) {
             const auto file = input_.heat_maps / heatMapName(page);
-            std::ifstream in(file, std::ios::binary);
+            std::error_code ignored;
+            const bool usable = std::filesystem::is_regular_file(file, ignored);
+            std::ifstream in(usable ? file : std::filesystem::path(), std::ios::binary);
             const std::string png{std::istreambuf_iterator<char>(in), {}};
             if (!in || !png.starts_with("\x89PNG"))
                 return fail(

@@ -220,11 +220,12 @@ void warnOfExtensions(ImportContext& context) {
         if (std::ranges::count(known_extensions, name) > 0 || std::ranges::count(harmless_extensions, name) > 0)
             continue;
         const auto lossy = std::ranges::find(lossy_extensions, name, &IgnoredExtension::name);
-        context.warn("extensionsUsed",
-                     fmt::format("'{}' is ignored: {}", name,
-                                 lossy != lossy_extensions.end()
-                                     ? lossy->loss
-                                     : "what it adds is missing from the bake. Export the level without it."));
+        context.warn(
+            "extensionsUsed",
+            fmt::format("'{}' is ignored: {}", name,
+                        lossy != lossy_extensions.end()
+                            ? lossy->loss
+                            : "if it changes what is seen, the bake lacks that. Export the level without it."));
     }
 }
 

@@ -296,8 +296,11 @@ class LevelImporter {
         for (const EmissionGroup& group : *groups) {
             Expected<SceneMesh> mesh = meshes_->import(at.node, group.primitives, at.world_from_node);
             if (!mesh) return std::unexpected(mesh.error());
-            if (group.light_set && !isEmissiveMesh(*mesh) && (group.by_material || !isLight(node)))
-                return withoutLight(owner, scene_.light_sets[*group.light_set].name, group.named_by);
+            if (group.light_set && !isEmissiveMesh(*mesh)) {
+                const std::string& set = scene_.light_sets[*group.light_set].name;
+                if (group.by_material) return withoutEmission(owner, set, group.named_by);
+                if (!isLight(node)) return withoutLight(owner, set, group.named_by);
+            }
             if (mesh->triangles.empty()) continue;
             any = true;
             place(at, *settings, group.light_set, std::move(*mesh));
@@ -337,6 +340,13 @@ class LevelImporter {
                               fmt::format("is in the light set '{}'{}, but has neither a light nor an emissive mesh. "
                                           "Remove 'dimmer_light_set', or give its material emission.",
                                           set, stated_by == owner ? "" : fmt::format(" (by {})", stated_by)));
+    }
+    // A material speaks for its own emission alone.
+    std::unexpected<Error> withoutEmission(const std::string& owner, const std::string& set,
+                                           const std::string& material) const {
+        return context_.error(owner, fmt::format("is in the light set '{}' (by {}), which does not shine. Give it "
+                                                 "emission; a light's 'dimmer_light_set' is its node's.",
+                                                 set, material));
     }
 
     // A node with a profile may carry a punctual light besides, for programs that do not read profiles.

@@ -5,6 +5,7 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <memory>
 #include <new>
@@ -16,25 +17,42 @@ namespace {
 
 // Kinds of surfaces are geometries of their own: what must be asked for its alpha, so that opaque rays skip it, and
 // leaves among walls, which collect rays and stop none. Kind k has Embree's ray mask 1 << k.
-enum Kind : unsigned { opaque, transparent, opaque_leaf, transparent_leaf, kinds };
-constexpr unsigned mask_opaque = 1 << opaque, mask_transparent = 1 << transparent;
+// And of models, each of which some rays pass as if it were not there.
+enum Kind : unsigned { opaque, transparent, opaque_leaf, transparent_leaf, opaque_model, transparent_model, kinds };
+constexpr unsigned mask_opaque = 1 << opaque | 1 << opaque_model;
+constexpr unsigned mask_transparent = 1 << transparent | 1 << transparent_model;
 constexpr unsigned mask_leaves = 1 << opaque_leaf | 1 << transparent_leaf;
 // After passing a transparent surface a ray starts anew this far behind it.
 constexpr float step_past_m = 1e-4f;
 // A ray that passes more surfaces than this is taken to be stopped; real levels stack a handful.
 constexpr int transparent_layers_max = 64;
-// A ray that passes a model which is not there may meet many of its surfaces.
-constexpr int hits_max = 1024;
 // Whether a ray passes is drawn apart from where it goes.
 constexpr uint32_t transparency_seed = 0x3f84d5b5u;
 
-// What a ray carries along: where it leaves the leaves that it meets.
+// Where a ray goes on behind a surface that it passed: far away the step is less than floats tell apart.
+float behind(float distance_m) {
+    return std::max(distance_m + step_past_m, std::nextafter(distance_m, std::numeric_limits<float>::infinity()));
+}
+
+// What a ray carries along: where it leaves the leaves that it meets, and the model that is not there.
 struct Collector {
     RTCIntersectContext context;  // first, so that Embree's pointer to it is ours
     LeafHits* leaves;             // null: they are passed by
+    const LevelTriangle* triangles;
+    uint32_t ignored;
 
-    explicit Collector(LeafHits* into) : leaves(into) { rtcInitIntersectContext(&context); }
+    Collector(LeafHits* into, const LevelTriangle* of_level, uint32_t not_there)
+        : leaves(into), triangles(of_level), ignored(not_there) {
+        rtcInitIntersectContext(&context);
+    }
 };
+
+void leaveOut(const RTCFilterFunctionNArguments* args) {
+    const auto* const ray = reinterpret_cast<const Collector*>(args->context);
+    const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
+    const uint32_t triangle = static_cast<const uint32_t*>(args->geometryUserPtr)[hit->primID];
+    if (ray->triangles[triangle].model == ray->ignored) args->valid[0] = 0;
+}
 
 void collect(const RTCFilterFunctionNArguments* args) {
     auto* const into = reinterpret_cast<Collector*>(args->context)->leaves;
@@ -69,16 +87,16 @@ struct RayScene::Embree {
     Handle<RTCDevice> device{rtcNewDevice(nullptr)};
     Handle<RTCScene> scene_owner{rtcNewScene(device.get())};
     RTCScene scene = scene_owner.get();
+    const LevelTriangle* triangles;
     std::array<std::vector<uint32_t>, kinds> triangle_of;  // Embree primitive -> level triangle
 
-    Embree(const RayScene& level, Surfaces surfaces) {
+    Embree(const RayScene& level, Surfaces surfaces) : triangles(level.triangles().data()) {
         for (uint32_t t = 0; t < level.triangles().size(); ++t) {
             const LevelTriangle& triangle = level.triangles()[t];
             const bool is_transparent = level.scene().materials[triangle.material].alpha_mode != AlphaMode::Opaque;
             const bool collects = surfaces == Surfaces::Walls && triangle.condition != no_condition;
-            triangle_of[collects ? (is_transparent ? transparent_leaf : opaque_leaf)
-                                 : (is_transparent ? transparent : opaque)]
-                .push_back(t);
+            const Kind solid = collects ? opaque_leaf : triangle.model != no_model ? opaque_model : opaque;
+            triangle_of[solid + is_transparent].push_back(t);  // each kind's transparent one comes next
         }
         for (unsigned kind = 0; kind < kinds; ++kind) attach(kind, level);
         // Robust: rays must not slip through the edges that closed rooms are made of.
@@ -89,7 +107,8 @@ struct RayScene::Embree {
         if (rtcGetDeviceError(device.get()) != RTC_ERROR_NONE) throw std::bad_alloc();
     }
 
-    bool anyTransparent() const { return !triangle_of[transparent].empty(); }
+    bool anyTransparent() const { return !triangle_of[transparent].empty() || !triangle_of[transparent_model].empty(); }
+    static bool isTransparent(unsigned kind) { return (mask_transparent >> kind & 1) != 0; }
 
     void attach(unsigned kind, const RayScene& level) {
         const auto& list = triangle_of[kind];
@@ -113,10 +132,11 @@ struct RayScene::Embree {
                 indices[vertex] = static_cast<unsigned>(vertex);
             }
         rtcSetGeometryMask(geometry, 1u << kind);
-        if ((mask_leaves >> kind & 1) != 0) {
+        if (kind != opaque && kind != transparent) {
+            const bool is_leaf = (mask_leaves >> kind & 1) != 0;
             rtcSetGeometryUserData(geometry, const_cast<uint32_t*>(list.data()));
-            rtcSetGeometryIntersectFilterFunction(geometry, collect);
-            rtcSetGeometryOccludedFilterFunction(geometry, collect);
+            rtcSetGeometryIntersectFilterFunction(geometry, is_leaf ? collect : leaveOut);
+            rtcSetGeometryOccludedFilterFunction(geometry, is_leaf ? collect : leaveOut);
         }
         rtcCommitGeometry(geometry);
         rtcAttachGeometryByID(scene, geometry, kind);
@@ -141,14 +161,15 @@ struct RayScene::Embree {
     }
 
     bool intersect(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, float near_m, float far_m, unsigned mask,
-                   LeafHits* leaves = nullptr) const {
+                   uint32_t ignored, LeafHits* leaves = nullptr) const {
         prepare(ray_hit, origin, direction, near_m, far_m, leaves ? mask | mask_leaves : mask);
-        Collector collector(leaves);
+        Collector collector(leaves, triangles, ignored);
         rtcIntersect1(scene, &collector.context, &ray_hit);
         return ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     }
 
-    bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask, LeafHits* leaves = nullptr) const {
+    bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask, uint32_t ignored,
+                  LeafHits* leaves = nullptr) const {
         RTCRay ray{.org_x = origin.x,
                    .org_y = origin.y,
                    .org_z = origin.z,
@@ -161,7 +182,7 @@ struct RayScene::Embree {
                    .mask = leaves ? mask | mask_leaves : mask,
                    .id = 0,
                    .flags = 0};
-        Collector collector(leaves);
+        Collector collector(leaves, triangles, ignored);
         rtcOccluded1(scene, &collector.context, &ray);
         return ray.tfar < 0;
     }
@@ -241,9 +262,9 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     const Embree& among = embree(surfaces);
     RTCRayHit r;
     std::optional<Hit> found;
-    if (among.intersect(r, origin, direction, 0, distance_max_m, mask_opaque | mask_transparent, leaves)) {
+    if (among.intersect(r, origin, direction, 0, distance_max_m, mask_opaque | mask_transparent, ignored, leaves)) {
         found = hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, direction);
-        if (r.hit.geomID != opaque || ignored != no_model)
+        if (Embree::isTransparent(r.hit.geomID))
             found = throughLayers(among, {origin, direction, distance_max_m}, *found, seed, ignored, leaves);
     }
     if (leaves) finish(*leaves, direction, found ? found->distance_m : distance_max_m);
@@ -260,71 +281,43 @@ std::optional<Hit> RayScene::throughLayers(const Embree& among, const Way& way, 
                                            uint32_t ignored, LeafHits* leaves) const {
     const auto next = [&](float near_m, float far_m, unsigned mask, LeafHits* into) -> std::optional<Hit> {
         RTCRayHit r;
-        if (!among.intersect(r, way.origin, way.direction, near_m, far_m, mask, into)) return std::nullopt;
+        if (!among.intersect(r, way.origin, way.direction, near_m, far_m, mask, ignored, into)) return std::nullopt;
         return hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, way.direction);
     };
-    const auto isThere = [&](const Hit& h) { return ignored == no_model || triangles_[h.triangle].model != ignored; };
-    std::optional<Hit> wall;
-    bool knows_wall = false;
-    for (int hits = 0, layers = 0; hits < hits_max; ++hits) {
-        if (isThere(hit)) {
-            if (scene_.materials[triangles_[hit.triangle].material].alpha_mode == AlphaMode::Opaque) return hit;
-            if (++layers == transparent_layers_max) return hit;
-            const float chance = unitFloat(hash(seed ^ transparency_seed, static_cast<uint32_t>(layers)));
-            if (chance < alphaAt(hit.triangle, hit.u, hit.v)) return hit;
-            if (!knows_wall) {
-                wall = next(std::max(0.0f, hit.distance_m - step_past_m), way.length_m, mask_opaque, leaves);
-                knows_wall = !wall || isThere(*wall);  // else the ray comes by it again
-            }
-        }
-        const float near_m = hit.distance_m + step_past_m;
-        const auto behind = knows_wall ? next(near_m, wall ? wall->distance_m : way.length_m, mask_transparent, nullptr)
-                                       : next(near_m, way.length_m, mask_opaque | mask_transparent, leaves);
-        if (!behind) return knows_wall ? wall : std::nullopt;
-        hit = *behind;
+    const auto lets = [&](const Hit& h, int layer) {
+        const float chance = unitFloat(hash(seed ^ transparency_seed, static_cast<uint32_t>(layer)));
+        return layer < transparent_layers_max && chance >= alphaAt(h.triangle, h.u, h.v);
+    };
+    if (!lets(hit, 1)) return hit;
+    const auto wall = next(std::max(0.0f, hit.distance_m - step_past_m), way.length_m, mask_opaque, leaves);
+    const float far_m = wall ? wall->distance_m : way.length_m;
+    for (int layer = 2;; ++layer) {
+        const auto layer_hit = next(behind(hit.distance_m), far_m, mask_transparent, nullptr);
+        if (!layer_hit) return wall;
+        hit = *layer_hit;
+        if (!lets(hit, layer)) return hit;
     }
-    return std::nullopt;
-}
-
-float RayScene::transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
-                                     float distance_m, LeafHits* leaves) const {
-    float passed = 1, near_m = 0;
-    for (int hits = 0, layers = 0; layers < transparent_layers_max && hits < hits_max && passed > 0; ++hits) {
-        RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_opaque | mask_transparent, leaves))
-            return passed;
-        const uint32_t triangle = among.triangle_of[r.hit.geomID][r.hit.primID];
-        if (triangles_[triangle].model != model) {
-            passed *= 1 - alphaAt(triangle, r.hit.u, r.hit.v);
-            ++layers;
-        }
-        near_m = r.ray.tfar + step_past_m;
-    }
-    return 0;
 }
 
 float RayScene::transmittance(glm::vec3 origin, glm::vec3 direction, float distance_m, Surfaces surfaces,
                               uint32_t ignored, LeafHits* leaves) const {
     const Embree& among = embree(surfaces);
-    float passed = 1;
-    if (ignored != no_model) {
-        passed = transmittanceWithout(ignored, among, origin, direction, distance_m, leaves);
-    } else {
-        if (among.occluded(origin, direction, distance_m, mask_opaque, leaves)) return 0;
-        if (among.anyTransparent()) passed = throughTransparent(among, origin, direction, distance_m);
-    }
+    if (among.occluded(origin, direction, distance_m, mask_opaque, ignored, leaves)) return 0;
+    const float passed =
+        among.anyTransparent() ? throughTransparent(among, {origin, direction, distance_m}, ignored) : 1;
     if (leaves && passed > 0) finish(*leaves, direction, distance_m);
     return passed;
 }
 
-float RayScene::throughTransparent(const Embree& among, glm::vec3 origin, glm::vec3 direction, float distance_m) const {
+float RayScene::throughTransparent(const Embree& among, const Way& way, uint32_t ignored) const {
     float passed = 1, near_m = 0;
     for (int layer = 0; layer < transparent_layers_max; ++layer) {
         RTCRayHit r;
-        if (!among.intersect(r, origin, direction, near_m, distance_m, mask_transparent)) return passed;
-        passed *= 1 - alphaAt(among.triangle_of[transparent][r.hit.primID], r.hit.u, r.hit.v);
+        if (!among.intersect(r, way.origin, way.direction, near_m, way.length_m, mask_transparent, ignored))
+            return passed;
+        passed *= 1 - alphaAt(among.triangle_of[r.hit.geomID][r.hit.primID], r.hit.u, r.hit.v);
         if (passed <= 0) return 0;
-        near_m = r.ray.tfar + step_past_m;
+        near_m = behind(r.ray.tfar);
     }
     return 0;
 }
@@ -343,7 +336,7 @@ void RayScene::finish(LeafHits& leaves, glm::vec3 direction, float distance_m) c
 
 bool RayScene::blocked(glm::vec3 from, glm::vec3 to) const {
     const float distance_m = glm::length(to - from);
-    return distance_m > 0 && all_->occluded(from, (to - from) / distance_m, distance_m, mask_opaque);
+    return distance_m > 0 && all_->occluded(from, (to - from) / distance_m, distance_m, mask_opaque, no_model);
 }
 
 }  // namespace dimmer::cook

@@ -108,12 +108,10 @@ class RayScene {
         float length_m;
     };
     Hit hitOf(uint32_t triangle, float distance_m, float u, float v, glm::vec3 direction) const;
-    // What stops a ray whose first hit is `hit`.
+    // What stops a ray whose first hit, `hit`, may let it pass.
     std::optional<Hit> throughLayers(const Embree& among, const Way& way, Hit hit, uint32_t seed, uint32_t ignored,
                                      LeafHits* leaves) const;
-    float transmittanceWithout(uint32_t model, const Embree& among, glm::vec3 origin, glm::vec3 direction,
-                               float distance_m, LeafHits* leaves) const;
-    float throughTransparent(const Embree& among, glm::vec3 origin, glm::vec3 direction, float distance_m) const;
+    float throughTransparent(const Embree& among, const Way& way, uint32_t ignored) const;
     void finish(LeafHits& leaves, glm::vec3 direction, float distance_m) const;
 
     const Scene& scene_;

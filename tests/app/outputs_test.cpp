@@ -1,6 +1,7 @@
 // Files that a command writes: never its own input or another output, and looked at before the work, not after it.
 #include <app/tool_fixture.h>
 #include <dimmer/pack.h>
+#include <pipeline/level_files.h>
 
 namespace dimmer::test {
 namespace {
@@ -88,6 +89,14 @@ TEST_F(Outputs, NeverAFileThatTheLevelNames) {
         write("deep.gltf", R"({"extras": )" + std::string(200000, '[') + std::string(200000, ']') + "}");
     expectRefusedAtOnce({"cook", deep, "-o", file("other.dimmer")}, {"deep.gltf", "nests"});
     EXPECT_FALSE(std::filesystem::exists(file("other.dimmer")));
+}
+
+// What somebody notes on a node is no file that the level is read from; what comes behind it may be.
+TEST_F(Outputs, PropertiesOfTheLevelsOwnAreNoFiles) {
+    const std::string level = write("noted.gltf", R"({"asset": {"version": "2.0"},
+        "nodes": [{"extras": {"uri": "house.dimmer", "more": [{"uri": "notes.txt"}]}, "name": "a"}],
+        "buffers": [{"extras": {"uri": "x"}, "uri": "parts.bin", "byteLength": 4}]})");
+    EXPECT_THAT(cook::filesNamedBy(level), testing::ElementsAre(file("parts.bin")));
 }
 
 TEST_F(Outputs, NeverAProfileThatTheProfileExtends) {

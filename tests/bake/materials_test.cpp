@@ -178,6 +178,42 @@ TEST(BakeMaterials, ADecalMakesNoHoleInItsWall) {
             const auto hit = rays.nearest(from, {0, -1, 0}, 10, seed);
             ASSERT_TRUE(hit) << gap_m;
             EXPECT_LE(hit->distance_m, 1.0f + 1e-5f);
+            EXPECT_EQ(rays.transmittance(from, {0, -1, 0}, 10), 0.0f);
+        }
+    }
+}
+
+// Floats tell steps of 0.24 mm apart there.
+TEST(BakeMaterials, CutOutsFarAlongARayLetItPass) {
+    Scene scene;
+    Material net = lambert(0.5f);
+    net.alpha_mode = AlphaMode::Blend;
+    net.alpha = 0;
+    addFloor(scene, 1, addMaterial(scene, net));
+    const RayScene rays(scene);
+    for (const float height_m : {1500.0f, 2500.0f, 100000.0f}) {
+        EXPECT_FALSE(rays.nearest({0.1f, height_m, 0.2f}, {0, -1, 0}, 2 * height_m, 1)) << height_m;
+        EXPECT_EQ(rays.transmittance({0.1f, height_m, 0.2f}, {0, -1, 0}, 2 * height_m), 1.0f) << height_m;
+    }
+}
+
+// A model that is not there takes nothing along that touches it.
+TEST(BakeMaterials, AnIgnoredModelLeavesItsFloor) {
+    for (const float gap_m : {0.0f, 5e-5f, 1e-3f}) {
+        Scene scene;
+        const uint32_t grey = addMaterial(scene, lambert(0.5f));
+        addFloor(scene, 2, grey);
+        addSolid(scene, "crate", {0, 0.5f + gap_m, 0}, glm::vec3(0.5f), grey);
+        for (SceneMesh& mesh : scene.meshes)
+            if (mesh.node == "crate") mesh.model = 0;
+        const RayScene rays(scene);
+        for (int i = 0; i < 100; ++i) {
+            const glm::vec3 from(0.4f - 0.008f * static_cast<float>(i), 0.5f, 0.1f);
+            const auto hit = rays.nearest(from, {0, -1, 0}, 10, 1, Surfaces::All, 0);
+            ASSERT_TRUE(hit) << gap_m;
+            EXPECT_EQ(rays.triangles()[hit->triangle].mesh, 0u);
+            EXPECT_EQ(rays.transmittance(from, {0, -1, 0}, 10, Surfaces::All, 0), 0.0f);
+            EXPECT_EQ(rays.transmittance(from, {0, 1, 0}, 10, Surfaces::All, 0), 1.0f);
         }
     }
 }

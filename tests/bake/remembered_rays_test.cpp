@@ -120,6 +120,10 @@ TEST(RememberedRays, GoOnWhereTheyEnd) {
         row.next = 0;
         EXPECT_EQ(lightAt(i, 4 * rays_per_round, &row), lightAt(i, 4 * rays_per_round, nullptr)) << i;
         through += !row.through.empty();
+        RowEnds few;
+        few.kept_max = 3 * rays_per_round / 2;  // whole rounds are remembered
+        EXPECT_EQ(lightAt(i, 4 * rays_per_round, &few), lightAt(i, 4 * rays_per_round, nullptr)) << i;
+        EXPECT_EQ(few.ends.size(), rays_per_round);
     }
     EXPECT_GT(through, 50u);
 }

@@ -146,6 +146,8 @@ TEST(SampleScript, RefusesWeightsThatTheRuntimeWouldRefuse) {
 TEST(SampleScript, CommentsBeginWords) {
     EXPECT_EQ(parse("frames 4 # four").frames, 4u);
     EXPECT_EQ(parse("# nothing\nframes 5\t#five").frames, 5u);
+    EXPECT_EQ(parse("camera \"upper floor\" # two words\nframes 6").frames, 6u);
+    EXPECT_THAT(parseError("at 0 set 6\"hall=1 # dim"), testing::Not(HasSubstr("dim")));
     EXPECT_THAT(parseError("at 0 set hall#1=0.5"), HasSubstr("hall#1"));
     EXPECT_THAT(parseError("camera \"cam #2\""), HasSubstr("cam #2"));
 }

@@ -204,6 +204,11 @@ TEST(PackDamage, ChunksOutOfPlace) {
     }
 }
 
+TEST(PackDamage, AChunkHoldsWhatItStates) {
+    const Bytes file = withTable(packBytes(samplePack()), [](auto& table) { table[1].real_bytes += 1; });
+    expectRefused(file, "does not hold the", "one byte more");
+}
+
 // Of one frame under many names, 31 kB unfolded to hundreds of megabytes.
 TEST(PackDamage, ChunksThatShareBytes) {
     const Bytes whole = packBytes(samplePack());

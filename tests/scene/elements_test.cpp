@@ -135,7 +135,7 @@ TEST(SceneElements, AMaterialDoesNotSpeakForALight) {
     expectWarning(*scene, {"node 'lamp'", "'dimmer_bake'"});
     // Then nothing is left that the set could dim.
     material.erase("emissiveFactor");
-    expectBadInput(level.import(), {"node 'lamp'", "by material 'glow'", "'sign'"});
+    expectBadInput(level.import(), {"node 'lamp'", "by material 'glow'", "'sign'", "does not shine"});
 }
 
 TEST(SceneElements, ANodesMaxWeightHoldsForItsMaterialsSet) {
