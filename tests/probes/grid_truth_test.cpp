@@ -48,8 +48,8 @@ TEST(GridTruth, TwoRooms) {
         printf("two_rooms %s in the open, at draft: mean %.2f %%, p95 %.2f %%, bias %+.2f %%\n", name, 100 * f.mean,
                100 * f.p95, 100 * f.bias);
         EXPECT_EQ(f.points, truth.size());
-        // The goals for our own levels are 8 and 25 %, at final. Where 58 probes end up is chaotic: found were 7.0 to 8.8
-        // and 19 to 30 % after changes that moved no surface's light by 0.2 points.
+        // The goals for our own levels are 8 and 25 %, at final. Where 58 probes end up is chaotic: found were 7.0
+        // to 8.8 and 19 to 30 % after changes that moved no surface's light by 0.2 points.
         EXPECT_LE(f.mean, 0.10) << name;
         EXPECT_LE(f.p95, 0.33) << name;
     }
