@@ -1,6 +1,7 @@
 #include <app/bench.h>
 
 #include <app/bench_cases.h>
+#include <app/say.h>
 
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
@@ -173,6 +174,8 @@ Expected<void> measureVulkan(const Pack& pack, const HeadlessDevice& device, con
         if (made) {
             copies = std::move(*made);
             roof.copies = &*copies;
+        } else {
+            sayMessage("measured without the copy roof: " + made.error().message);
         }
     }
     return measureAll(*runtime, update, roof, options, mode.name, report.results);
