@@ -61,7 +61,7 @@ template <ColorFormat format>
 void BatchBlend<format>::encode(TexelRecord* records) const {
     for (uint32_t i = 0; i < count_; ++i) {
         const bool usable = (l_[i] >= blend_luminance_min) & (l_[i] <= blend_luminance_max);
-        const float inverse = 1.0f / (usable ? l_[i] : 1.0f);
+        const float inverse = reciprocal(usable ? l_[i] : 1.0f);
         const auto code = [&](float sum, float scale) {
             return static_cast<uint32_t>(static_cast<int32_t>((usable ? sum : 0.0f) * (inverse * scale) + 0.5f));
         };

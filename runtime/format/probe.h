@@ -42,7 +42,7 @@ struct ProbeBlend {
             const float l = light[i % 3];
             const bool in_range = l >= blend_luminance_min && l <= blend_luminance_max;
             usable[i] = in_range ? ~0u : 0u;
-            inverse[i] = 1.0f / (in_range ? l : 1.0f);
+            inverse[i] = reciprocal(in_range ? l : 1.0f);
         }
         std::array<uint8_t, probe_codes> codes;
         for (size_t i = 0; i < probe_codes; ++i) {

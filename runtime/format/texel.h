@@ -1,5 +1,5 @@
 // The 8-byte lightmap texel and its arithmetic. GLSL twin, function by function: shaders/include/dimmer/texel.glsl.
-// Both round alike wherever the device's +, * and / are IEEE, so executors can be compared bit for bit.
+// Both round alike wherever a device's + and * do as IEEE says (reciprocal.h): executors can be compared bit for bit.
 //
 //   irradiance  E_z, irradiance on the texel's own normal, lux * exposure, in one of two formats:
 //               B10G11R11_UFLOAT_PACK32: steps of 1/64 (r, g) and 1/32 (b) of the value; largest 65024 and 64512;
@@ -15,6 +15,7 @@
 // The model "linear" has the same moments and clamps their sum instead: E(n) = E_z max(0, r + b.n_xy + (1-r) n_z).
 #pragma once
 
+#include <format/reciprocal.h>
 #include <pack/pack_data.h>
 
 #include <algorithm>
@@ -190,7 +191,7 @@ struct TexelBlend {
     uint32_t encodeMean() const {
         // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
         const bool usable = l >= blend_luminance_min && l <= blend_luminance_max;
-        const float inverse = 1.0f / (usable ? l : 1.0f);
+        const float inverse = reciprocal(usable ? l : 1.0f);
         const auto code = [&](float sum, float scale) {
             return static_cast<uint32_t>(static_cast<int>((usable ? sum : 0.0f) * (inverse * scale) + 0.5f));
         };

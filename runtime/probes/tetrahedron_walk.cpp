@@ -1,5 +1,7 @@
 #include <probes/tetrahedron_walk.h>
 
+#include <format/reciprocal.h>
+
 #include <algorithm>
 
 namespace dimmer {
@@ -19,7 +21,7 @@ uint32_t startOf(const GlobalGrid& grid, const Vec3& p) {
     const StartGrid& box = grid.start;
     std::array<uint32_t, 3> cell;
     for (size_t i = 0; i < 3; ++i) {
-        const float share = (p[i] - box.min_m[i]) / (box.max_m[i] - box.min_m[i]);
+        const float share = (p[i] - box.min_m[i]) * reciprocal(box.max_m[i] - box.min_m[i]);
         cell[i] = std::min(static_cast<uint32_t>(share * static_cast<float>(box.counts[i])), box.counts[i] - 1);
     }
     return grid.starts[cell[0] + size_t{box.counts[0]} * (cell[1] + size_t{box.counts[1]} * cell[2])];
@@ -40,7 +42,7 @@ std::array<float, 4> barycentricOf(const GlobalGrid& grid, uint32_t tetrahedron,
     const Vec3 c = fromTo(point, grid.positions[probes[2]]), d = fromTo(point, grid.positions[probes[3]]);
     const std::array<float, 4> volumes = {determinant(b, c, d), determinant(a, d, c), determinant(a, b, d),
                                           determinant(a, c, b)};
-    const float inverse = 1.0f / (volumes[0] + volumes[1] + volumes[2] + volumes[3]);
+    const float inverse = reciprocal(volumes[0] + volumes[1] + volumes[2] + volumes[3]);
     return {volumes[0] * inverse, volumes[1] * inverse, volumes[2] * inverse, volumes[3] * inverse};
 }
 
@@ -52,7 +54,8 @@ std::array<float, 4> clampWeights(std::array<float, 4> weights) {
         sum += w;
     }
     if (!(sum > 0)) return {0.25f, 0.25f, 0.25f, 0.25f};
-    for (float& w : weights) w /= sum;
+    const float inverse = reciprocal(sum);
+    for (float& w : weights) w *= inverse;
     return weights;
 }
 
@@ -128,7 +131,8 @@ std::array<float, 4> probeWeights(const GlobalGrid& grid, const GridPlace& place
         sum += weights[v];
     }
     if (!(sum > visible_weight_min)) return b;
-    for (float& w : weights) w /= sum;
+    const float inverse = reciprocal(sum);
+    for (float& w : weights) w *= inverse;
     return weights;
 }
 

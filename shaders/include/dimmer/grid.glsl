@@ -63,7 +63,7 @@ vec4 dimmer_barycentric(uint tetrahedron, vec3 point) {
     vec4 volumes = vec4(dimmer_determinant(b, c, d), dimmer_determinant(a, d, c), dimmer_determinant(a, b, d),
                         dimmer_determinant(a, c, b));
     precise float sum = volumes.x + volumes.y + volumes.z + volumes.w;
-    precise float inverse = 1.0 / sum;
+    float inverse = dimmer_reciprocal(sum);
     precise vec4 shares = volumes * inverse;
     return shares;
 }
@@ -104,7 +104,7 @@ uint dimmer_start(vec3 point, vec3 low, vec3 high) {
     uvec4 counts = DIMMER_GRID_WORDS(2);
     precise vec3 extent = high - low;
     precise vec3 from_low = point - low;
-    precise vec3 share = from_low / extent;
+    precise vec3 share = from_low * dimmer_reciprocal(extent);
     precise vec3 cells = share * vec3(counts.xyz);
     uvec3 cell = min(uvec3(cells), counts.xyz - 1u);
     uint number = cell.x + counts.x * (cell.y + counts.y * cell.z);
@@ -134,7 +134,7 @@ DimmerGridPlace dimmer_locate(vec3 point, uint hint) {
         weights[i] = w > 0.0 ? (w < 1.0 ? w : 1.0) : 0.0;
     }
     precise float sum = weights.x + weights.y + weights.z + weights.w;
-    precise vec4 shares = weights / sum;
+    precise vec4 shares = weights * dimmer_reciprocal(sum);
     place.barycentric = sum > 0.0 ? shares : vec4(0.25);
     return place;
 }
@@ -155,7 +155,7 @@ vec4 dimmer_probe_weights(DimmerGridPlace place) {
         weights[v] = b[v] * clamped;
     }
     precise float sum = weights.x + weights.y + weights.z + weights.w;
-    precise vec4 shares = weights / sum;
+    precise vec4 shares = weights * dimmer_reciprocal(sum);
     return sum > dimmer_visible_weight_min ? shares : b;
 }
 

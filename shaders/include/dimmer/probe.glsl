@@ -45,7 +45,7 @@ DimmerProbe dimmer_probe_encode(DimmerProbeBlend sum, uint format) {
     probe.light = dimmer_encode_light(sum.light, format);
     bvec3 usable = bvec3(uvec3(greaterThanEqual(sum.light, vec3(dimmer_blend_luminance_min))) &
                          uvec3(lessThanEqual(sum.light, vec3(dimmer_blend_luminance_max))));
-    precise vec3 inverse = 1.0 / mix(vec3(1), sum.light, usable);
+    vec3 inverse = dimmer_reciprocal(mix(vec3(1), sum.light, usable));
     for (int i = 0; i < 6; ++i) probe.bands[i] = 0u;
     for (int i = 0; i < dimmer_probe_triples; ++i) {
         precise vec3 means = mix(vec3(0), sum.bands[i], usable) * inverse + 0.5;

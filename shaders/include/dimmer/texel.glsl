@@ -1,5 +1,5 @@
 // The 8-byte lightmap texel and its arithmetic: the GLSL twin, function by function, of runtime/format/texel.h, which
-// says what the bytes mean. Everything is `precise`, so that devices with IEEE arithmetic agree bit for bit with C++.
+// says what the bytes mean. Everything is `precise` and nothing is divided, so that devices agree bit for bit with C++.
 #ifndef DIMMER_TEXEL_GLSL
 #define DIMMER_TEXEL_GLSL
 
@@ -10,6 +10,21 @@ const uint dimmer_e5b9g9r9 = 1u;
 const int dimmer_blend_exponent = 12;
 const float dimmer_blend_luminance_min = 2.3283064365386962890625e-10;  // 2^-32
 const float dimmer_blend_luminance_max = 268435456.0;                   // 2^28
+
+// 1 / x to 1e-7, the same on every device: Vulkan's divisions are not. See runtime/format/reciprocal.h.
+vec3 dimmer_reciprocal(vec3 x) {
+    precise vec3 y = uintBitsToFloat(0x7ef311c3u - floatBitsToUint(x));
+    for (int i = 0; i < 2; ++i) y = y * (2.0 - x * y);
+    y = y + y * (1.0 - x * y);
+    return y;
+}
+
+float dimmer_reciprocal(float x) {
+    precise float y = uintBitsToFloat(0x7ef311c3u - floatBitsToUint(x));
+    for (int i = 0; i < 2; ++i) y = y * (2.0 - x * y);
+    y = y + y * (1.0 - x * y);
+    return y;
+}
 
 float dimmer_luminance(float r, float g, float b) {
     precise float l = 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -85,7 +100,7 @@ uvec2 dimmer_blend_encode(DimmerTexelBlend sum, uint format) {
     uint irradiance = dimmer_encode_light(sum.irradiance, format);
     // Out of range the means may be NaN, which has no integer: they are replaced before they are used.
     bool usable = sum.l >= dimmer_blend_luminance_min && sum.l <= dimmer_blend_luminance_max;
-    precise float inverse = 1.0 / (usable ? sum.l : 1.0);
+    float inverse = dimmer_reciprocal(usable ? sum.l : 1.0);
     precise vec3 scale = inverse * vec3(1.0, 1.0 / 1024.0, 1.0 / 1048576.0);
     precise vec3 means = (usable ? sum.direction : vec3(0)) * scale + 0.5;
     ivec3 codes = ivec3(means);
