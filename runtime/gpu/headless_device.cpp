@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <gpu/headless_device.h>
+#include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -43,14 +44,6 @@ bool layerInstalled(const char* name) {
     vkEnumerateInstanceLayerProperties(&count, layers.data());
     return std::any_of(layers.begin(), layers.end(),
                        [&](const auto& layer) { return std::string_view(layer.layerName) == name; });
-}
-
-std::vector<VkQueueFamilyProperties> queueFamilies(VkPhysicalDevice device) {
-    uint32_t count = 0;
-    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
-    std::vector<VkQueueFamilyProperties> families(count);
-    vkGetPhysicalDeviceQueueFamilyProperties(device, &count, families.data());
-    return families;
 }
 
 // A family that draws and computes, else, where drawing is not asked for, one that computes.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <format/texel.h>
+#include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -68,11 +69,7 @@ Expected<ImageViewHandle> createView(VkDevice device, VkImage image, VkFormat fo
 }
 
 VkPipelineStageFlags samplingStages(const VulkanContext& vulkan) {
-    uint32_t count = 0;
-    vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, nullptr);
-    std::vector<VkQueueFamilyProperties> families(count);
-    vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, families.data());
-    const bool draws = families[vulkan.queue_family].queueFlags & VK_QUEUE_GRAPHICS_BIT;
+    const bool draws = queueFamilies(vulkan.physical_device)[vulkan.queue_family].queueFlags & VK_QUEUE_GRAPHICS_BIT;
     return VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | (draws ? VK_PIPELINE_STAGE_FRAGMENT_SHADER_BIT : 0);
 }
 

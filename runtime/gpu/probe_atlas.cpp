@@ -72,6 +72,9 @@ Expected<std::vector<uint32_t>> ProbeAtlas::read(uint32_t set, Transfer& readbac
         const VkBufferCopy region{
             .srcOffset = offset, .dstOffset = 0, .size = std::min(Transfer::staging_bytes, bytes - offset)};
         DIMMER_TRY(readback.run([&](VkCommandBuffer commands) {
+            // Perhaps written on another queue: the host has waited, which makes nothing visible here.
+            memoryBarrier(commands, compute, VK_ACCESS_MEMORY_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                          VK_ACCESS_TRANSFER_READ_BIT);
             vkCmdCopyBuffer(commands, buffer(set), readback.staging().buffer.get(), 1, &region);
             memoryBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
                           VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT);

@@ -1,8 +1,10 @@
 #include <dimmer/runtime.h>
 
+#include <fmt/format.h>
 #include <gpu/lightmap_pages.h>
 #include <gpu/probe_blender.h>
 #include <gpu/probe_resampler.h>
+#include <gpu/queue_family.h>
 #include <gpu/record_loader.h>
 #include <gpu/texel_blender.h>
 #include <gpu/texel_executor.h>
@@ -24,10 +26,22 @@ double microsecondsSince(std::chrono::steady_clock::time_point start) {
 }
 
 Expected<void> checkContext(const VulkanContext& vulkan) {
-    if (vulkan.instance && vulkan.physical_device && vulkan.device && vulkan.queue) return {};
-    return fail(ErrorCode::InvalidArgument,
-                "The VulkanContext has a null handle; instance, physical device, device "
-                "and queue are all needed.");
+    if (!vulkan.instance || !vulkan.physical_device || !vulkan.device || !vulkan.queue)
+        return fail(ErrorCode::InvalidArgument,
+                    "The VulkanContext has a null handle; instance, physical device, device "
+                    "and queue are all needed.");
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    if (properties.apiVersion < VK_API_VERSION_1_2)
+        return fail(
+            ErrorCode::Unsupported,
+            fmt::format("VulkanContext::physical_device is a device of Vulkan {}.{}, and the runtime needs 1.2. "
+                        "Choose another one, or update its driver.",
+                        VK_API_VERSION_MAJOR(properties.apiVersion), VK_API_VERSION_MINOR(properties.apiVersion)));
+    const auto families = queueFamilies(vulkan.physical_device);
+    DIMMER_TRY(checkQueueFamily("queue_family", vulkan.queue_family, families));
+    if (!vulkan.compute_queue) return {};
+    return checkQueueFamily("compute_queue_family", vulkan.compute_queue_family, families);
 }
 
 Expected<SemaphoreHandle> createTimeline(VkDevice device) {
@@ -37,6 +51,13 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
     VkSemaphore semaphore = VK_NULL_HANDLE;
     DIMMER_VK(vkCreateSemaphore, device, &info, nullptr, &semaphore);
     return SemaphoreHandle(device, semaphore);
+}
+
+// What the other queue wrote, and the host has waited for, is available; a host wait does not make it visible here.
+void seeOtherQueue(VkCommandBuffer commands) {
+    constexpr VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
+    memoryBarrier(commands, stages, VK_ACCESS_MEMORY_WRITE_BIT, stages,
+                  VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_TRANSFER_READ_BIT);
 }
 
 }  // namespace
@@ -57,15 +78,20 @@ struct Runtime::Impl {
     // change places with every update, pages when a state is complete.
     uint32_t front = 0, target = 0;
     uint32_t probe_front = 0, probe_target = 0;
-    uint32_t front_before = 0, probe_front_before = 0;  // what discardRecorded() goes back to
-    std::unique_ptr<TexelExecutor> executor;            // none when the pack has no receivers
-    std::optional<ProbeBlender> probes;                 // none when the pack has no probes that change
-    std::optional<ProbeAtlas> atlas;                    // none when there are no probes
-    std::optional<GpuBuffer> grid_table;                // none when the pack has no global grid
-    std::optional<ProbeResampler> resampler;            // none without room for moving models
-    std::span<const ResampleItem> model_items;          // of the last plan
+    std::unique_ptr<TexelExecutor> executor;    // none when the pack has no receivers
+    std::optional<ProbeBlender> probes;         // none when the pack has no probes that change
+    std::optional<ProbeAtlas> atlas;            // none when there are no probes
+    std::optional<GpuBuffer> grid_table;        // none when the pack has no global grid
+    std::optional<ProbeResampler> resampler;    // none without room for moving models
+    std::span<const ResampleItem> model_items;  // of the last plan
     bool texels_planned = false, probes_planned = false, models_planned = false;
-    bool recorded = false;               // the last plan is in a command buffer of the caller's
+    // Of the last update that record() found work for, unless submit() found some since: what discardRecorded() takes
+    // back, and the sets that were to be sampled before.
+    struct Recording {
+        bool texels, probes, models;
+        uint32_t target, probe_target, front, probe_front;
+    };
+    std::optional<Recording> recorded;
     std::optional<RecordLoader> loader;  // none in modes that load nothing later
     std::vector<LightSet> loading;       // sets whose records are on their way
     std::vector<RecordsState> records;   // per element
@@ -170,6 +196,7 @@ Expected<void> Runtime::Impl::waitForSubmitted() const {
 
 void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner,
                                  bool drawing) {
+    if (ownQueue() != vulkan.queue) seeOtherQueue(commands);
     if (texels_planned) executor->write(planner, target);
     if (probes_planned) probes->write(*probe_planner, probe_target);
     if (models_planned) resampler->write(model_items, probe_target);
@@ -291,10 +318,11 @@ void Runtime::planProbes(UpdateStats& stats) {
 // still say what was put off.
 bool Runtime::planNext(UpdateStats& stats) {
     Impl& impl = *impl_;
-    impl.texels_planned = impl.probes_planned = impl.models_planned = impl.recorded = false;
+    impl.texels_planned = impl.probes_planned = impl.models_planned = false;
     planTexels(stats);
     planProbes(stats);
     if (!impl.texels_planned && !impl.probes_planned && !impl.models_planned) return false;
+    impl.recorded.reset();
     impl.timed = false;
     return true;
 }
@@ -330,19 +358,31 @@ Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
         return std::unexpected(std::move(done.error()));
     }
     impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
-    impl_->recorded = true;
-    impl_->front_before = impl_->front;
-    impl_->probe_front_before = impl_->probe_front;
+    impl_->recorded = Impl::Recording{.texels = impl_->texels_planned,
+                                      .probes = impl_->probes_planned,
+                                      .models = impl_->models_planned,
+                                      .target = impl_->target,
+                                      .probe_target = impl_->probe_target,
+                                      .front = impl_->front,
+                                      .probe_front = impl_->probe_front};
     finish();
     impl_->stats.host_us = microsecondsSince(start);
     return impl_->stats;
 }
 
 void Runtime::discardRecorded() {
-    if (!std::exchange(impl_->recorded, false)) return;
+    Impl& impl = *impl_;
+    const auto recorded = std::exchange(impl.recorded, std::nullopt);
+    if (!recorded) return;
+    // Calls that found nothing to do have come in between: the plan is theirs.
+    impl.texels_planned = recorded->texels;
+    impl.probes_planned = recorded->probes;
+    impl.models_planned = recorded->models;
+    impl.target = recorded->target;
+    impl.probe_target = recorded->probe_target;
     rollback();
-    impl_->front = impl_->front_before;
-    impl_->probe_front = impl_->probe_front_before;
+    impl.front = recorded->front;
+    impl.probe_front = recorded->probe_front;
 }
 
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
+#include <gpu/vk_struct.h>
 #include <spirv/blend_texels_comp.h>
 #include <update/device_places.h>
 
@@ -35,14 +36,15 @@ Specialisation specialisationOf(uint32_t group, ColorFormat format) {
 
 }  // namespace
 
-Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places,
-                                const Planner& planner, uint64_t records_bytes_max) {
+Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t allocation_bytes_max,
+                                const DevicePlaces& places, const Planner& planner, uint64_t records_bytes_max) {
     // Of the records, the store has no more than this on the device at a time.
     const uint64_t all_bytes = places.records * sizeof(TexelRecord);
     const uint64_t payload_bytes = records_bytes_max == 0 ? all_bytes : std::min(all_bytes, records_bytes_max);
     const uint64_t base_bytes = places.receivers.size() * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
-    const uint64_t bytes_max = uint64_t{limits.maxTexelBufferElements} * wide_bytes;
+    // Each buffer has an allocation of its own.
+    const uint64_t bytes_max = std::min(limits.maxTexelBufferElements * wide_bytes, allocation_bytes_max);
     constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
     if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end)
         return fail(
@@ -51,22 +53,28 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, const Devi
                         "than {}, {} and {}. Cook with fewer texels per metre or a higher activity threshold.",
                         planner.itemsMax(), planner.termsMax(), planner.overlapMax(), index_end, index_end, count_end));
     if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
-    return fail(ErrorCode::Unsupported,
-                fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
-                            "exceeds what this Vulkan device reads as one texel buffer, {} bytes. Cook with fewer "
-                            "texels per metre or a higher activity threshold, or, where it is the records alone, "
-                            "load fewer at a time: load_records = false and a smaller records_bytes_max.",
-                            payload_bytes, base_bytes, work_bytes, bytes_max));
+    return fail(
+        ErrorCode::Unsupported,
+        fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
+                    "exceeds what this Vulkan device holds and reads as one texel buffer, {} bytes. Cook with fewer "
+                    "texels per metre or a higher activity threshold, or, where it is the records alone, "
+                    "load fewer at a time: load_records = false and a smaller records_bytes_max.",
+                    payload_bytes, base_bytes, work_bytes, bytes_max));
 }
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             std::span<const LightmapPages> page_sets, Transfer& transfer,
                                             const RuntimeOptions& options) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    DIMMER_TRY(checkTexelLimits(properties.limits, placesOf(data), planner, options.records_bytes_max));
+    auto allocations =
+        vkStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+    auto properties =
+        vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
+    vkGetPhysicalDeviceProperties2(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits& limits = properties.properties.limits;
+    DIMMER_TRY(checkTexelLimits(limits, allocations.maxMemoryAllocationSize, placesOf(data), planner,
+                                options.records_bytes_max));
     TexelBlender blender;
-    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    blender.groups_x_max_ = limits.maxComputeWorkGroupCount[0];
     blender.per_combination_ = options.mode == UpdateMode::PerCombination;
     auto records = RecordStore::create(vulkan, data, options.records_bytes_max);
     if (!records) return std::unexpected(std::move(records.error()));

@@ -9,10 +9,10 @@
 
 namespace dimmer {
 
-// Whether the device reads what a TexelBlender keeps there, with RuntimeOptions::records_bytes_max: Unsupported, with
-// the mend, where it does not.
-Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, const DevicePlaces& places,
-                                const Planner& planner, uint64_t records_bytes_max);
+// Whether the device holds, in allocations of that size, and reads what a TexelBlender keeps there, with
+// RuntimeOptions::records_bytes_max: Unsupported, with the mend, where it does not.
+Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t allocation_bytes_max,
+                                const DevicePlaces& places, const Planner& planner, uint64_t records_bytes_max);
 
 class TexelBlender : public TexelExecutor {
    public:

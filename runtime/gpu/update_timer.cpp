@@ -1,5 +1,6 @@
 #include <gpu/update_timer.h>
 
+#include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -9,10 +10,7 @@
 namespace dimmer {
 
 Expected<std::optional<UpdateTimer>> UpdateTimer::create(const VulkanContext& vulkan) {
-    uint32_t count = 0;
-    vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, nullptr);
-    std::vector<VkQueueFamilyProperties> families(count);
-    vkGetPhysicalDeviceQueueFamilyProperties(vulkan.physical_device, &count, families.data());
+    const auto families = queueFamilies(vulkan.physical_device);
     uint32_t bits = families[vulkan.queue_family].timestampValidBits;
     if (vulkan.compute_queue) bits = std::min(bits, families[vulkan.compute_queue_family].timestampValidBits);
     if (bits == 0) return std::nullopt;

@@ -194,6 +194,7 @@ Expected<void> LightState::setLimits(const UpdateLimits& limits) {
         return fail(
             ErrorCode::InvalidArgument,
             fmt::format("A tolerance of {} quanta is neither 0 nor a positive number.", limits.tolerance_quanta));
+    for (auto& planner : planners_) planner->prepareLimits(limits);
     for (auto& planner : planners_) planner->setLimits(limits);
     return {};
 }

@@ -52,14 +52,15 @@ void Planner::setElement(uint32_t index, Weight weight) {
 void Planner::setLimits(const UpdateLimits& limits) {
     if (limits == limits_) return;
     // What may throw comes first: then nothing has changed.
-    if (quanta_per_weight_.empty() && limits != UpdateLimits{}) prepareLimits();
+    prepareLimits(limits);
     recheck_ = recheck_ || limits.tolerance_quanta < limits_.tolerance_quanta;
     // With another budget, what waits goes on: where it follows each frame's headroom, no state would ever be complete.
     starts_over_ = starts_over_ || limits.tolerance_quanta != limits_.tolerance_quanta || limits.receivers_max == 0;
     limits_ = limits;
 }
 
-void Planner::prepareLimits() {
+void Planner::prepareLimits(const UpdateLimits& limits) {
+    if (!quanta_per_weight_.empty() || limits == UpdateLimits{}) return;
     std::vector<float> quanta = quantaPerWeight(data_);
     std::vector<Weight> written;
     written.reserve(receivers_.terms.size());
@@ -279,7 +280,6 @@ bool Planner::plan() {
     work_ = {};
     stats_ = {};
     changes_.clear();
-    carried_over_ = waiting() || recheck_;
     collectChanges();
     stats_.contributions_changed = static_cast<uint32_t>(changes_.size());
     return finishPlan();
@@ -288,15 +288,13 @@ bool Planner::plan() {
 bool Planner::planWaiting() {
     work_ = {};
     stats_ = {};
-    changes_.clear();
-    carried_over_ = true;
     return finishPlan();
 }
 
 bool Planner::finishPlan() {
     terms_.clear();
+    if (waiting_clusters_.empty()) return false;  // and the parts of before stay for rollback()
     parts_.clear();
-    if (waiting_clusters_.empty()) return false;
     if (limits_.receivers_max == 0)
         takeAll();
     else
@@ -306,16 +304,11 @@ bool Planner::finishPlan() {
 }
 
 void Planner::rollback() {
-    // With limits or leftovers, what the pages hold is known by cluster only: those planned are written once more.
-    if (carried_over_ || !written_.empty())
-        for (const Part& part : parts_) waitWhole(part.cluster);
-    // What waits now must not be written with the weights of before, which are brought back here.
-    starts_over_ = true;
-    for (const Change& change : changes_) {
-        planned_[change.contribution] = change.before;
-        markDirty(change.contribution);
+    for (const Part& part : parts_) {
+        waitWhole(part.cluster);
+        waiting_[part.cluster].quanta = plain_quanta;  // a limit chose it for being visible
     }
-    changes_.clear();
+    starts_over_ = true;  // the weights of a plan that never ran are no state to go on with
     parts_.clear();
     work_ = {};
     stats_ = {};

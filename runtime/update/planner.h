@@ -55,6 +55,8 @@ class Planner {
     // Of texels alone. In range already. The first limits of a planner cost a pass over the pack's records. Where there
     // is no memory for what they need it throws, and nothing has changed.
     void setLimits(const UpdateLimits& limits);
+    // What of setLimits() may throw, so that several planners get limits together or not at all.
+    void prepareLimits(const UpdateLimits& limits);
     // What waits must not be written with the weights that the last plan() saw.
     void startOver() { starts_over_ = true; }
 
@@ -67,7 +69,8 @@ class Planner {
     // Something waits, and may be written with the weights that the last plan() saw: not after startOver(), a
     // rollback(), another tolerance, or the end of the limit on receivers.
     bool mayGoOn() const { return waiting() && !starts_over_; }
-    // The last plan was not executed: what it would have written is written by the next plan().
+    // The last plan that had anything to do was not executed, or nobody knows: what it would have written is written by
+    // the next plan(), whatever the weights are then.
     void rollback();
 
     // Whether batches wait, as the last plan was limited.
@@ -110,7 +113,6 @@ class Planner {
         uint32_t first_term = 0, term_count = 0;
     };
 
-    void prepareLimits();
     Weight product(const Contribution& contribution) const;
     void markDirty(uint32_t contribution);
     void collectChanges();
@@ -145,13 +147,12 @@ class Planner {
     std::vector<bool> element_is_dirty_, contribution_is_dirty_;
 
     std::vector<Change> changes_;             // of the last plan
-    bool carried_over_ = false;               // some clusters waited already when the last plan began
     std::vector<Waiting> waiting_;            // per cluster
     std::vector<uint32_t> waiting_clusters_;  // those with a count
     std::vector<Urgent> urgent_;              // only within takeWithin(); no room until there are limits
     std::vector<uint64_t> cluster_marks_;     // one bit per cluster, all 0 between calls
     size_t first_mark_ = 0, end_mark_ = 0;    // the words with marks
-    std::vector<Part> parts_;                 // of the last plan, ascending by cluster
+    std::vector<Part> parts_;                 // of the last plan that had any, ascending by cluster
     std::vector<WorkItem> items_;
     std::vector<WorkTerm> terms_;
     WorkList work_;

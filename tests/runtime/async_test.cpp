@@ -27,14 +27,40 @@ class AsyncTest : public test::GpuTest {
         ASSERT_TRUE(std::ranges::equal(pages->irradiance, cpu.irradiancePages()));
         ASSERT_TRUE(std::ranges::equal(pages->direction, cpu.directionPages()));
     }
+    // Light as a runtime shows it that was created for this state.
+    static void expectFreshPages(Runtime& gpu) {
+        Runtime fresh = runtimeOf(gpu.pack());
+        test::copyState(gpu, fresh);
+        ASSERT_TRUE(fresh.submit());
+        const auto pages = gpu.readPages(), expected = fresh.readPages();
+        ASSERT_TRUE(pages && expected);
+        EXPECT_TRUE(pages->irradiance == expected->irradiance);
+        EXPECT_TRUE(pages->direction == expected->direction);
+        EXPECT_TRUE(pages->probes == expected->probes);
+    }
+    static void recordInto(VkCommandBuffer commands, Runtime& gpu) {
+        VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
+        ASSERT_EQ(vkBeginCommandBuffer(commands, &begin), VK_SUCCESS);
+        ASSERT_GT(gpu.record(commands)->dispatches, 0u);
+        ASSERT_EQ(vkEndCommandBuffer(commands), VK_SUCCESS);
+    }
     // An update in commands that never run.
     static void recordInVain(Runtime& gpu) {
         auto commands = createCommandBuffer(device().context().device, device().context().queue_family);
         ASSERT_TRUE(commands);
-        VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
-        ASSERT_EQ(vkBeginCommandBuffer(commands->commands, &begin), VK_SUCCESS);
-        ASSERT_GT(gpu.record(commands->commands)->dispatches, 0u);
-        ASSERT_EQ(vkEndCommandBuffer(commands->commands), VK_SUCCESS);
+        recordInto(commands->commands, gpu);
+    }
+    static void recordAndRun(Runtime& gpu) {
+        const VulkanContext vulkan = device().context();
+        auto commands = createCommandBuffer(vulkan.device, vulkan.queue_family);
+        ASSERT_TRUE(commands);
+        recordInto(commands->commands, gpu);
+        VkSubmitInfo submit{};
+        submit.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO;
+        submit.commandBufferCount = 1;
+        submit.pCommandBuffers = &commands->commands;
+        ASSERT_EQ(vkQueueSubmit(vulkan.queue, 1, &submit, VK_NULL_HANDLE), VK_SUCCESS);
+        ASSERT_EQ(vkQueueWaitIdle(vulkan.queue), VK_SUCCESS);
     }
     // Updates until limits leave nothing for later.
     static void submitAll(Runtime& gpu) {
@@ -244,6 +270,61 @@ TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpFor) {
             expectEqualPages(gpu, cpu);
             EXPECT_TRUE(std::ranges::equal(gpu.readPages()->probes, cpu.probes()));
         }
+}
+
+// The frames after it found nothing to do, by either way, before it turned out that it never runs.
+TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpForAfterIdleUpdates) {
+    test::Random random(72);
+    PackData data = test::randomPack(72);
+    test::addRandomProbes(data, random);
+    const Pack pack = packOf(std::move(data));
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
+        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+        ASSERT_TRUE(gpu.submit());
+        ASSERT_TRUE(gpu.apply("all=0.5"));
+        const uint32_t shown = gpu.pageSet(), probes_shown = gpu.probeSet();
+        recordInVain(gpu);
+        EXPECT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+        EXPECT_EQ(gpu.submit()->dispatches, 0u);
+        gpu.discardRecorded();
+        EXPECT_EQ(gpu.pageSet(), shown);
+        EXPECT_EQ(gpu.probeSet(), probes_shown);
+        EXPECT_GT(gpu.submit()->dispatches, 0u);
+        expectFreshPages(gpu);
+    }
+}
+
+// The idle update was a way back to the state that the other set of pages still holds.
+TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpForAfterSetsChangedPlaces) {
+    const Pack pack = packOf(test::randomPack(73, {.doors = 0}));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.submit());
+    const uint32_t shown = gpu.pageSet();
+    ASSERT_TRUE(gpu.apply("all=0.5"));
+    recordInVain(gpu);
+    ASSERT_TRUE(gpu.apply("all=1"));
+    ASSERT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+    ASSERT_EQ(gpu.pageSet(), shown);
+    gpu.discardRecorded();
+    ASSERT_TRUE(gpu.apply("all=0.5"));
+    EXPECT_GT(gpu.submit()->dispatches, 0u) << "no pages hold this state";
+    expectFreshPages(gpu);
+}
+
+// It was only the idle frame that was given up.
+TEST_F(AsyncTest, TakingBackWhatDidRunLeavesThePagesExact) {
+    const Pack pack = packOf(test::randomPack(74, {.doors = 0}));
+    for (const Buffering buffering : {Buffering::InPlace, Buffering::Double}) {
+        Runtime gpu = runtimeOf(pack, {.buffering = buffering});
+        ASSERT_TRUE(gpu.submit() && gpu.wait());
+        ASSERT_TRUE(gpu.apply("all=0.5"));
+        recordAndRun(gpu);
+        EXPECT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+        gpu.discardRecorded();
+        ASSERT_TRUE(gpu.apply("all=1"));
+        ASSERT_TRUE(gpu.submit());
+        expectFreshPages(gpu);
+    }
 }
 
 // Both sets of pages hold the light whose records go, before the recording that never runs or after it.

@@ -5,6 +5,7 @@
 #include "random_pack.h"
 
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <set>
 #include <utility>
@@ -184,12 +185,32 @@ TEST(Planner, AfterARollbackTheNextPlanRepeatsTheWork) {
     ASSERT_TRUE(planner.plan());
     EXPECT_EQ(recordsRead(planner, data), lost);
 
-    // Back to what the pages really hold: nothing to do.
+    // Back to the weights of before too: whether the pages still hold them is not certain.
     planner.setElement(2, 0.25f);
     ASSERT_TRUE(planner.plan());
     planner.rollback();
     planner.setElement(2, 0.5f);
+    ASSERT_TRUE(planner.plan());
+    EXPECT_EQ(recordsRead(planner, data), lost);
     EXPECT_FALSE(planner.plan());
+}
+
+// Nothing changed, or nothing by more than the tolerance, since the plan that is taken back.
+TEST(Planner, ARollbackReachesBackPastPlansThatHadNothingToDo) {
+    const PackData data = setsOnly(6);
+    for (const float tolerance : {0.0f, std::numeric_limits<float>::max()}) {
+        Planner planner(data);
+        planner.plan();
+        planner.setElement(2, 0.5f);
+        ASSERT_TRUE(planner.plan());
+        const auto lost = recordsRead(planner, data);
+        planner.setLimits({.tolerance_quanta = tolerance});
+        if (tolerance > 0) planner.setElement(2, 0.75f);
+        ASSERT_FALSE(planner.plan());
+        planner.rollback();
+        ASSERT_TRUE(planner.plan());
+        EXPECT_EQ(recordsRead(planner, data), lost);
+    }
 }
 
 // With limits, what was planned in vain waits: with the weights of now, not with those that came back.

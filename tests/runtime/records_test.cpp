@@ -62,13 +62,30 @@ TEST(TexelLimits, RecordsThatAreNeverLoadedTogetherNeedNoRoomTogether) {
     const uint64_t half = places.records * sizeof(TexelRecord) / 2;
     VkPhysicalDeviceLimits limits{};
     limits.maxTexelBufferElements = static_cast<uint32_t>(half / 16);
-    EXPECT_TRUE(checkTexelLimits(limits, places, planner, half / 16 * 16));
+    EXPECT_TRUE(checkTexelLimits(limits, UINT64_MAX, places, planner, half / 16 * 16));
     for (const uint64_t bytes_max : {uint64_t{0}, half + 16, 3 * half}) {
-        const auto refused = checkTexelLimits(limits, places, planner, bytes_max);
+        const auto refused = checkTexelLimits(limits, UINT64_MAX, places, planner, bytes_max);
         ASSERT_FALSE(refused);
         EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
         EXPECT_THAT(refused.error().message, HasSubstr("records_bytes_max"));
     }
+}
+
+// Some devices read texel buffers of any size and allocate less at once.
+TEST(TexelLimits, RecordsLargerThanOneAllocationAreRefused) {
+    const PackData data = test::randomPack(79);
+    const DevicePlaces places = placesOf(data);
+    const Planner planner(data);
+    const uint64_t bytes = places.records * sizeof(TexelRecord);
+    VkPhysicalDeviceLimits limits{};
+    limits.maxTexelBufferElements = UINT32_MAX;
+    EXPECT_TRUE(checkTexelLimits(limits, bytes, places, planner, 0));
+    EXPECT_TRUE(checkTexelLimits(limits, bytes / 2, places, planner, bytes / 2));
+    const auto refused = checkTexelLimits(limits, bytes - 1, places, planner, 0);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("{} bytes. Cook", bytes - 1)));
+    EXPECT_THAT(refused.error().message, HasSubstr("records_bytes_max"));
 }
 
 class TexelBuffers : public test::GpuTest {};

@@ -3,6 +3,7 @@
 #include <dimmer/runtime.h>
 #include <gmock/gmock.h>
 #include <gpu/lightmap_pages.h>
+#include <gpu/queue_family.h>
 
 #include "gpu_fixture.h"
 #include "pages.h"
@@ -318,6 +319,36 @@ TEST_F(RuntimeTest, ANullContextIsRefused) {
     const auto refused = Runtime::create({}, packOf(test::randomPack(1)));
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+}
+
+TEST_F(RuntimeTest, AQueueFamilyThatTheDeviceDoesNotHaveIsRefused) {
+    const Pack pack = packOf(test::randomPack(1));
+    const auto expectRefused = [&](const VulkanContext& vulkan, const char* field) {
+        const auto refused = Runtime::create(vulkan, pack);
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+        EXPECT_THAT(refused.error().message, testing::HasSubstr(field));
+    };
+    VulkanContext vulkan = device().context();
+    vulkan.queue_family = 1000;
+    expectRefused(vulkan, "VulkanContext::queue_family is 1000");
+    vulkan = device().context();
+    vulkan.compute_queue_family = 1000;
+    EXPECT_TRUE(Runtime::create(vulkan, pack)) << "without a queue its family says nothing";
+    vulkan.compute_queue = vulkan.queue;
+    expectRefused(vulkan, "VulkanContext::compute_queue_family is 1000");
+}
+
+TEST(QueueFamilies, OneWithoutComputeIsRefused) {
+    VkQueueFamilyProperties families[2]{};
+    families[0].queueFlags = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_TRANSFER_BIT;
+    families[1].queueFlags = VK_QUEUE_COMPUTE_BIT;
+    EXPECT_TRUE(checkQueueFamily("queue_family", 1, families));
+    EXPECT_FALSE(checkQueueFamily("queue_family", 2, families));
+    const auto refused = checkQueueFamily("queue_family", 0, families);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("VK_QUEUE_COMPUTE_BIT"));
 }
 
 TEST_F(RuntimeTest, OutlivesItsPackAndMayBeMovedAndDroppedMidFlight) {
