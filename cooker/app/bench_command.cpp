@@ -27,7 +27,8 @@ void addBenchCommand(CLI::App& app, int& exit_code) {
         options->command = fmt::format("dimmer bench {} --mode {} --frames {}", options->pack.string(), options->mode,
                                        options->frames);
         if (!options->only.empty()) options->command += fmt::format(" --only '{}'", options->only);
-        auto done = checkFiles({{"PACK", options->pack}}, {{"--json", options->json}, {"--plot", options->plot}});
+        auto done =
+            checkFiles({{"PACK", options->pack}}, {printed("--json", options->json), {"--plot", options->plot}});
         if (done) done = benchPack(*options, std::cout);
         exit_code = done ? exit_done : reportError(done.error());
     });

@@ -39,6 +39,11 @@ std::filesystem::path defaultCache(const std::filesystem::path& pack) {
     return pack.parent_path() / ".dimmer-cache";
 }
 
+std::filesystem::path cacheOf(const CookArguments& a) {
+    if (a.no_cache) return {};
+    return a.options.cache.empty() ? defaultCache(a.options.pack) : a.options.cache;
+}
+
 void printCache(const CookStats& stats) {
     fmt::print("\n{:<26} {}\n", "stage", "from the cache?");
     for (const CacheLine& line : stats.cache)
@@ -130,10 +135,12 @@ Expected<void> checkArguments(const CookArguments& a) {
     if (std::ranges::find(shipped, a.options.profile) == shipped.end())
         inputs.push_back({"--profile", a.options.profile});
     addFilesOf("--profile", filesExtendedBy(a.options.profile), inputs);
-    if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" and "-" stand for a file here
-    return checkFiles(
-        inputs,
-        {{"--output", a.options.pack}, {"--json", a.json}, {"--write-level", a.write_level}, {"--report", a.report}});
+    if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" stands for a file here
+    inputs.push_back({"--cache", cacheOf(a), true});              // a cook does without one that cannot be written
+    return checkFiles(inputs, {{"--output", a.options.pack},
+                               printed("--json", a.json),
+                               {"--write-level", a.write_level},
+                               {"--report", a.report}});
 }
 
 void sayWarnings(std::span<const std::string> warnings) {
@@ -163,10 +170,7 @@ int run(const CookArguments& a) {
         progress = std::make_unique<TerminalProgress>();
     CookOptions options = a.options;
     options.cache_bytes_max = uint64_t{a.cache_limit_mb} << 20;
-    if (a.no_cache)
-        options.cache.clear();
-    else if (options.cache.empty())
-        options.cache = defaultCache(options.pack);
+    options.cache = cacheOf(a);
     std::vector<std::string> warnings;
     auto result = cook(options, *progress, &warnings);
     sayWarnings(result ? result->stats.warnings : warnings);

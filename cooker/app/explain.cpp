@@ -172,7 +172,7 @@ nlohmann::ordered_json toJson(const PackData& d, const Explanation& e, const Exp
 }
 
 int run(const ExplainArguments& a) {
-    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {printed("--json", a.json)}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     const auto finite = [](float v) { return std::isfinite(v); };

@@ -19,6 +19,12 @@ bool isFile(const NamedFile& file) {
     return !file.path.empty() && file.path != "-";
 }
 
+Expected<void> checkName(const NamedFile& output) {
+    if (output.prints || output.path != "-") return {};
+    return fail(ErrorCode::InvalidArgument, fmt::format("{}: '-' is not a {}; write to ./- if you mean that",
+                                                        output.role, output.folder ? "folder" : "file"));
+}
+
 bool isStream(const fs::file_status& status) {
     return fs::exists(status) && !fs::is_regular_file(status) && !fs::is_directory(status);
 }
@@ -76,6 +82,7 @@ std::vector<fs::path> filesIn(const fs::path& folder, bool (*isOne)(std::string_
 
 Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs) {
     for (size_t i = 0; i < outputs.size(); ++i) {
+        if (auto ok = checkName(outputs[i]); !ok) return ok;
         if (!isFile(outputs[i])) continue;
         for (const NamedFile& input : inputs)
             if (auto ok = checkApart(outputs[i], input); !ok) return ok;

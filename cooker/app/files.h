@@ -10,12 +10,19 @@
 
 namespace dimmer::cook {
 
-// `role`: how messages call it, e.g. "PACK" or "--json". A path that is empty or "-" is no file.
+// `role`: how messages call it, e.g. "PACK" or "--json". An empty path is no file; "-" is a standard stream of an
+// input, and of an output that `prints`; others must not have it.
 struct NamedFile {
     std::string role;
     std::filesystem::path path;
     bool folder = false;  // files are written into it; it is made when missing
+    bool prints = false;
 };
+
+// An output that "-" sends to stdout.
+inline NamedFile printed(const std::string& role, const std::filesystem::path& path) {
+    return {.role = role, .path = path, .prints = true};
+}
 
 // Adds files that belong to the one of `role`, as "a file of ROLE".
 void addFilesOf(const std::string& role, const std::vector<std::filesystem::path>& paths,

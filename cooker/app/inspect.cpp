@@ -200,7 +200,7 @@ void printSettings(const PackData& d) {
 }
 
 int run(const InspectArguments& a) {
-    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {printed("--json", a.json)}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     std::error_code ignored;

@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
     using namespace dimmer::cook;
     keepClosedStreamsClosed();
     std::signal(SIGPIPE, SIG_IGN);  // writing shows what is lost; of stderr that is no reason to end the work
+    std::signal(SIGXFSZ, SIG_IGN);  // so that a write past a limit fails, and its file goes
     CLI::App app{
         "Dimmer: baked global illumination that you can switch.\nCooks a glTF level into a pack, and looks into "
         "packs."};

@@ -36,7 +36,7 @@ Expected<void> writeValues(const std::string& file, std::span<const QueryPoint> 
 int run(const ReferenceArguments& a) {
     std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"--points", a.points}};
     addFilesOf("LEVEL", filesNamedBy(a.level), inputs);
-    if (auto ok = checkFiles(inputs, {{"--output", a.output}}); !ok) return reportError(ok.error());
+    if (auto ok = checkFiles(inputs, {printed("--output", a.output)}); !ok) return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
     const auto state = readReferenceState(*scene, a.state);

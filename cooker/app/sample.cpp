@@ -40,7 +40,7 @@ Expected<LightPages> pagesOnGpu(const Pack& pack, const std::string& state) {
 }
 
 int run(const SampleArguments& a) {
-    if (auto ok = checkFiles({{"PACK", a.pack}, {"--points", a.points}}, {{"--output", a.output}}); !ok)
+    if (auto ok = checkFiles({{"PACK", a.pack}, {"--points", a.points}}, {printed("--output", a.output)}); !ok)
         return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());

@@ -44,7 +44,7 @@ nlohmann::ordered_json toJson(const StressReport& r, const StressArguments& a, c
 }
 
 int run(StressArguments a) {
-    if (auto ok = checkFiles({{"PACK", a.pack}}, {{"--json", a.json}}); !ok) return reportError(ok.error());
+    if (auto ok = checkFiles({{"PACK", a.pack}}, {printed("--json", a.json)}); !ok) return reportError(ok.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
     a.options.seconds_max = a.minutes * 60;

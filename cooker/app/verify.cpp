@@ -158,7 +158,7 @@ Expected<void> writeCsv(const VerifyReport& report, const std::string& file) {
 int run(VerifyArguments a) {
     std::vector<NamedFile> inputs = {{"LEVEL", a.level}, {"PACK", a.pack}};
     addFilesOf("LEVEL", filesNamedBy(a.level), inputs);
-    std::vector<NamedFile> outputs = {{"--json", a.json}, {"--csv", a.csv}, {"--heatmap", a.heatmap, true}};
+    std::vector<NamedFile> outputs = {printed("--json", a.json), {"--csv", a.csv}, {"--heatmap", a.heatmap, true}};
     addFilesOf("--heatmap", filesIn(a.heatmap, isHeatMapName), outputs);
     if (auto ok = checkFiles(inputs, outputs); !ok) return reportError(ok.error());
     const auto scene = importLevel(a.level);

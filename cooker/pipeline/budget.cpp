@@ -160,11 +160,11 @@ std::string budgetTable(const PackData& pack, const PackCost& cost, const Profil
     row("local grids", cost.local_grids, budgets.budget_local_grids);
     row("ancillary", cost.ancillary, 0);
     row("total on the device", cost.device(), budgets.budget_total);
-    table += fmt::format("\n{:<26} {:>12} {:>12} {:>15}  {}\n", "element", "bytes", "receivers", "energy dropped",
+    table += fmt::format("\n{:<26} {:>12} {:>13} {:>15}  {}\n", "element", "bytes", "texel records", "energy dropped",
                          "share of the budget");
     for (const ElementCost& e : cost.elements)
         table += fmt::format(
-            "{:<26} {:>12} {:>12} {:>15}  {}\n",
+            "{:<26} {:>12} {:>13} {:>15}  {}\n",
             (pack.elements[e.element].kind == ElementKind::Door ? "door:" : "") + pack.elements[e.element].name,
             humanBytes(e.bytes), e.receivers, energyDropped(pack, e.element),
             share(e.bytes, budgets.budget_per_element));

@@ -32,8 +32,8 @@ struct PackCost {
 
 PackCost costOf(const PackData& pack);
 
-// Per category and per element: bytes, share of the budget, receivers, energy dropped. Of the profile, its budgets
-// count.
+// Per category and per element: bytes, share of the budget, records of texels, energy dropped. Of the profile, its
+// budgets count.
 std::string budgetTable(const PackData& pack, const PackCost& cost, const Profile& budgets);
 
 // An error of ErrorCode::OverBudget that says what is over, by how much, and who holds the most.

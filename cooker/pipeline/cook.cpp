@@ -388,6 +388,13 @@ std::string waysOut(const std::vector<Remedy>& found) {
     return text;
 }
 
+// The figures of an error are those of the last cook, not of the settings that were asked for.
+std::string changedBefore(const std::vector<Remedy>& fitted) {
+    std::string text = fitted.empty() ? "" : "\n--fit had changed before this cook:";
+    for (const Remedy& remedy : fitted) text += "\n  " + remedy.text();
+    return text;
+}
+
 // Cooks, and with `fit` changes result.profile and cooks again until the pack is within its budgets.
 Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
                               CookCache* cache, CookResult& result) {
@@ -402,14 +409,16 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         const auto within = checkBudgets(*pack, cost, result.profile);
         if (within) return pack;
         if (!fit || round + 1 == fit_rounds_max) {
-            return fail(ErrorCode::OverBudget,
-                        within.error().message + waysOut(remedies(*pack, cost, result.profile, losses)));
+            return fail(ErrorCode::OverBudget, within.error().message +
+                                                   waysOut(remedies(*pack, cost, result.profile, losses)) +
+                                                   changedBefore(result.fitted));
         }
         const auto density_steps =
             std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
         if (remedy.changes.empty())
-            return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help");
+            return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help" +
+                                                   changedBefore(result.fitted));
         for (const Change& c : remedy.changes)
             if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
                 return std::unexpected(ok.error());
@@ -461,11 +470,12 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     if (!scene) return std::unexpected(scene.error());
     result.stats.warnings = scene->warnings;
     if (options.quality_is_chosen) profile->origin["quality"] = "command line";
-    const auto unknown = resolveSettings(*profile, *scene, options.set);
-    if (!unknown) return std::unexpected(unknown.error());
+    auto idle = resolveSettings(*profile, *scene, options.set);
+    if (!idle) return std::unexpected(idle.error());
+    for (std::string& warning : otherQualities(*profile, options.quality)) idle->push_back(std::move(warning));
     // The scene's, too: a pack in the cache is that of the same warnings.
     for (auto* warnings : {&result.stats.warnings, &scene->warnings})
-        warnings->insert(warnings->end(), unknown->begin(), unknown->end());
+        warnings->insert(warnings->end(), idle->begin(), idle->end());
     result.profile = *profile;
     auto cache = openCache(options, result.stats);
     const auto bytes = findOrMakePack(*scene, options, progress, cache ? &*cache : nullptr, result);

@@ -38,4 +38,12 @@ std::optional<std::string> farFromOrigin(const RayScene& rays) {
         rays.scene().file, most_m, far_m);
 }
 
+std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {
+    std::vector<std::string> warnings;
+    for (const auto& [key, origin] : profile.origin)
+        if (origin == "command line" && key.starts_with("bake.") && !key.starts_with("bake." + quality + "."))
+            warnings.push_back(fmt::format("--set {}: does nothing at quality '{}'", key, quality));
+    return warnings;
+}
+
 }  // namespace dimmer::cook

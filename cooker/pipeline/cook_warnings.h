@@ -1,11 +1,13 @@
 // What a cook says of a level that can be cooked, though not as somebody meant it.
 #pragma once
 
+#include <pipeline/profile.h>
 #include <scene/scene.h>
 #include <trace/ray_scene.h>
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace dimmer::cook {
 
@@ -16,5 +18,8 @@ std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
 // Coordinates are floats: far from the origin a step of theirs comes near what keeps rays off walls, until these are
 // lit from behind themselves.
 std::optional<std::string> farFromOrigin(const RayScene& rays);
+
+// Of the command line's settings for another quality, which do nothing.
+std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);
 
 }  // namespace dimmer::cook

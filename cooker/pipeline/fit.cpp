@@ -183,6 +183,10 @@ std::vector<Share> sharesOver(const PackCost& cost, const Profile& profile, cons
     return shares;
 }
 
+bool baseIsOver(const PackCost& cost, const Profile& profile) {
+    return profile.budget_base_lightmaps > 0 && cost.base_lightmap > profile.budget_base_lightmaps;
+}
+
 bool pagesOrRecordsAreOver(const PackCost& cost, const Profile& profile) {
     return !sharesOver(cost, profile, {}).empty();
 }
@@ -199,6 +203,7 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
         return std::ranges::all_of(over, [&](const Share& s) { return s.fitsWith(left, power); });
     };
     double too_little = 1, factor = density_factor_max;
+    if (const auto least = losses.texelsLeft(factor); least.pages >= 1 && least.charts >= 1) return remedy;
     remedy.fits = enough(factor) && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     for (int step = 0; step < density_steps_max; ++step) {
         const double middle = std::sqrt(too_little * factor);
@@ -226,7 +231,7 @@ Remedy withProbes(const PackData& pack, const PackCost& cost, const Profile& pro
     constexpr uint64_t corners = 8;  // of the grid's box, which are probes too
     const uint64_t probes = globalProbes(pack);
     if (!(left < 1) || probes <= corners) return remedy;
-    const auto to = static_cast<uint64_t>(probes_margin * left * static_cast<double>(probes));
+    const auto to = static_cast<uint64_t>(probes_margin * std::max(left, 0.0) * static_cast<double>(probes));
     if (to <= corners) return remedy;
     remedy.changes.push_back(
         {"grids.probes_max", static_cast<float>(profile.probes_max), static_cast<float>(to - corners)});
@@ -235,19 +240,20 @@ Remedy withProbes(const PackData& pack, const PackCost& cost, const Profile& pro
     return remedy;
 }
 
-// Saves nothing where the grid is not the trouble.
+// Saves nothing where the grid is not the trouble. Where the total asks for more probes than can go, its excess is left
+// to others.
 Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
-    double left = 1;
-    if (gridIsOver(cost, profile)) left = ratio(profile.budget_global_grid, cost.global_grid);
-    if (profile.budget_total > 0 && cost.device() > profile.budget_total) {
-        const uint64_t excess = cost.device() - profile.budget_total;
-        const uint64_t bytes = cost.global_grid + probeRecords(cost, losses);
-        if (excess >= bytes) return {};
-        left = std::min(left, 1 - ratio(excess, bytes));
-    }
-    Remedy remedy = withProbes(pack, cost, profile, left);
+    const double for_grid = gridIsOver(cost, profile) ? ratio(profile.budget_global_grid, cost.global_grid) : 1.0;
+    double for_total = 1;
+    if (profile.budget_total > 0 && cost.device() > profile.budget_total)
+        for_total -= ratio(cost.device() - profile.budget_total, cost.global_grid + probeRecords(cost, losses));
     Profile others = profile;
     others.budget_total = others.budget_global_grid = 0;
+    Remedy remedy = withProbes(pack, cost, profile, std::min(for_grid, for_total));
+    if (remedy.changes.empty()) {
+        remedy = withProbes(pack, cost, profile, for_grid);
+        others.budget_total = profile.budget_total;
+    }
     remedy.fits = !pagesOrRecordsAreOver(cost, others) && !localGridsAreOver(cost, profile);
     return remedy;
 }
@@ -299,8 +305,17 @@ uint32_t largestSet(const PackData& pack, const PackCost& cost) {
     return sets.empty() ? 0 : 1 + std::ranges::max_element(sets, {}, &ElementCost::bytes)->element;
 }
 
-bool baseIsOver(const PackCost& cost, const Profile& profile) {
-    return profile.budget_base_lightmaps > 0 && cost.base_lightmap > profile.budget_base_lightmaps;
+// Whether the coarsest pages and the highest thresholds would fit, and, where probes may go too, no grids. As
+// predicted, without a margin: what is in doubt is tried.
+bool mayFit(const PackData& pack, PackCost cost, Profile profile, const LossTable& losses, bool without_grids) {
+    const LossTable::TexelsLeft left = losses.texelsLeft(density_factor_max);
+    cost.base_lightmap = scaled(cost.base_lightmap, left.pages);
+    cost.dynamic = scaled(cost.dynamic, left.charts);
+    cost.ancillary = scaled(cost.ancillary, left.charts);
+    if (without_grids) cost.global_grid = cost.local_grids = 0;
+    profile.budget_per_element = scaled(profile.budget_per_element, 1 / left.charts);
+    const Rungs highest(losses.groupCount(), static_cast<uint8_t>(threshold_rungs.size() - 1));
+    return !baseIsOver(cost, profile) && !exceeded(limitsOf(pack, cost, profile, losses), highest);
 }
 
 }  // namespace
@@ -346,6 +361,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
 
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                      size_t density_steps) {
+    if (!mayFit(pack, cost, profile, losses, true)) return {};
     const auto limits = limitsOf(pack, cost, profile, losses);
     if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile, losses);
     if (localGridsAreOver(cost, profile)) return byLocalProbes(pack, cost, profile);
@@ -353,8 +369,13 @@ Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& 
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
         if (thresholds.fits && !thresholds.changes.empty()) return thresholds;
     }
-    if (Remedy all = byAll(pack, cost, profile, losses, density_steps); !all.changes.empty()) return all;
-    return byDensity(cost, profile, losses, density_steps);
+    Remedy remedy = byAll(pack, cost, profile, losses, density_steps);
+    const bool takes_probes = !remedy.changes.empty();
+    if (!takes_probes) remedy = byDensity(cost, profile, losses, density_steps);
+    if (!remedy.fits)
+        if (Remedy probes = byProbes(pack, cost, profile, losses); probes.fits && !probes.changes.empty())
+            return probes;
+    return takes_probes || mayFit(pack, cost, profile, losses, false) ? remedy : Remedy{};
 }
 
 }  // namespace dimmer::cook

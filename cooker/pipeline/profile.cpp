@@ -192,7 +192,8 @@ std::string Profile::settingsJson(const std::string& quality) const {
         const auto from = origin.find(key);
         out[key] = {{"value", shortDecimal(share)}, {"from", from == origin.end() ? "default" : from->second}};
     }
-    return out.dump();
+    // A file's name, which is where a setting may come from, need not be UTF-8.
+    return out.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 Expected<CookSettings> readSettings(const std::string& settings_json) {

@@ -286,14 +286,23 @@ class LevelWriter {
         return true;
     }
 
+    // Without links and "..": a ".." leads to the folder around what a link stands for, not around the link.
+    static std::filesystem::path realFolderOf(const std::filesystem::path& file) {
+        std::error_code error;
+        const auto folder = std::filesystem::absolute(file).parent_path();
+        const auto real = std::filesystem::weakly_canonical(folder, error);
+        return error ? folder.lexically_normal() : real;
+    }
+
     // Files that the level names relative to itself, seen from the new place.
     void moveReferences(const std::filesystem::path& from, const std::filesystem::path& to) {
-        const auto old_folder = std::filesystem::absolute(from).parent_path();
-        const auto new_folder = std::filesystem::absolute(to).parent_path();
+        const auto old_folder = realFolderOf(from), new_folder = realFolderOf(behindLinks(to).value_or(to));
         if (old_folder == new_folder) return;
         const auto move = [&](Json& uri) {
             const std::string text = uri.get<std::string>();
-            if (!text.starts_with("data:")) uri = (old_folder / text).lexically_relative(new_folder).generic_string();
+            if (text.starts_with("data:")) return;
+            const auto file = old_folder / text, seen = file.lexically_relative(new_folder);
+            uri = (seen.empty() ? file : seen).generic_string();
         };
         Json& d = document_.json;
         const Json::json_pointer sky("/scenes/" + std::to_string(d.value("scene", 0)) + "/extras/dimmer_sky_image");

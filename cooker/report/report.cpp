@@ -159,7 +159,7 @@ class Report {
         std::vector<ElementCost> by_size = cost_.elements;
         std::ranges::stable_sort(by_size, [](const auto& a, const auto& b) { return a.bytes > b.bytes; });
         body_ +=
-            "<h2>Light sets and doors</h2>\n<div class=scroll><table><tr><th>name<th>bytes<th>records<th>largest "
+            "<h2>Light sets and doors</h2>\n<div class=scroll><table><tr><th>name<th>bytes<th>texel records<th>largest "
             "weight<th>energy dropped\n";
         for (const ElementCost& e : by_size) {
             const Element& element = d_.elements[e.element];

@@ -16,6 +16,7 @@
 #include <cerrno>
 #include <cstring>
 #include <new>
+#include <optional>
 #include <string_view>
 
 namespace dimmer::cook {
@@ -298,11 +299,18 @@ Expected<void> writeToSpecialFile(const std::filesystem::path& path, std::span<c
     return {};
 }
 
-// mkstemp's files are private; a file that anybody makes is not.
-bool giveUsualRights(int file) {
+// The rights of a file that is there; none of what is none.
+std::optional<mode_t> rightsOf(const std::filesystem::path& path) {
+    struct stat status {};
+    if (stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return {};
+    return status.st_mode & 0777;
+}
+
+// mkstemp's files are private: this one gets the rights of the one that it replaces, or those of any new file.
+bool giveRights(int file, std::optional<mode_t> replaced) {
     const mode_t mask = umask(0);
     umask(mask);
-    return fchmod(file, 0666 & ~mask) == 0;
+    return fchmod(file, replaced.value_or(0666 & ~mask)) == 0;
 }
 
 // What mkstemp makes random behind the name of a file that is replaced.
@@ -313,7 +321,8 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
     std::string temporary = path.string().append(temporary_suffix);
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
-    const bool written = writeAll(file, bytes) && giveUsualRights(file) && (flush == Flush::No || fsync(file) == 0);
+    const bool written =
+        writeAll(file, bytes) && giveRights(file, rightsOf(path)) && (flush == Flush::No || fsync(file) == 0);
     const int error = written ? 0 : errno;
     close(file);
     if (written && rename(temporary.c_str(), path.c_str()) == 0) return {};
@@ -345,6 +354,9 @@ Expected<void> checkReplaceable(const std::filesystem::path& path) {
     // faccessat() asks for the user that creates files: access() would ask for the one behind a setuid.
     if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0)
         return ioError(path, "no file can be made in this folder", errno);
+    // The bits themselves, as root may write anything, and a rename asks nobody.
+    if (const auto rights = rightsOf(path); rights && (*rights & 0222) == 0)
+        return fail(ErrorCode::Io, fmt::format("{}: is read-only", path.string()));
     const auto tooLong = [&](size_t bytes, int limit) {
         const long most = pathconf(folder.c_str(), limit);  // of paths: with the 0 at their end
         return most > 0 && bytes + temporary_suffix.size() + (limit == _PC_PATH_MAX) > static_cast<size_t>(most);

@@ -115,7 +115,7 @@ TEST_F(Commands, InspectTableAndSettings) {
     EXPECT_EQ(table.exit_code, 0);
     EXPECT_THAT(table.err, IsEmpty());
     for (const char* word : {"total on the device", "base lightmaps", "dynamic records", "exposure", "clusters",
-                             "batches", "energy dropped", "overlap", "one", "both", "two"})
+                             "batches", "texel records", "energy dropped", "overlap", "one", "both", "two"})
         EXPECT_THAT(table.out, HasSubstr(word));
     const auto settings = runDimmer({"inspect", pack(), "--settings"});
     EXPECT_EQ(settings.exit_code, 0);

@@ -53,10 +53,10 @@ TEST_F(Kill, AtAnyMomentLeavesAWholePackAndAUsableCache) {
 
 TEST_F(Kill, AFullDiskAndAReadOnlyFolderAreSaid) {
     write("kept.dimmer", "the old pack");
-    // No file of this process and its children may grow past 512 bytes: a disk as good as full.
-    const std::string command = std::string("ulimit -f 1; trap '' XFSZ; '") + DIMMER_TOOL + "' cook '" +
-                                file("level.gltf") + "' -o '" + file("kept.dimmer") + "' --profile '" +
-                                file("quick.json") + "' --quality draft --cache '" + file("full_cache") + "'";
+    // No file of this process and its children may grow past 2 kB: a disk as good as full.
+    const std::string command = std::string("ulimit -f 4; '") + DIMMER_TOOL + "' cook '" + file("level.gltf") +
+                                "' -o '" + file("kept.dimmer") + "' --profile '" + file("quick.json") +
+                                "' --quality draft --cache '" + file("full_cache") + "'";
     const auto result = runProcess("/bin/sh", {"-c", command});
     EXPECT_EQ(result.exit_code, 2) << result.err;
     EXPECT_THAT(result.err, testing::HasSubstr("kept.dimmer"));

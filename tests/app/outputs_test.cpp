@@ -154,6 +154,46 @@ TEST_F(Outputs, OtherNamesOfTheSameFile) {
     expectSameFile({"export", file("linked.dimmer"), file("light")}, "a file of DIR", "PACK");
 }
 
+// A pack or a page is nothing to print, and a file of that name is hard to be rid of.
+TEST_F(Outputs, AMinusIsNoFile) {
+    const auto expectRefused = [](const std::vector<std::string>& arguments, const std::string& role,
+                                  const std::string& what = "file") {
+        expectRefusedAtOnce(arguments, {role + ": '-' is not a " + what + "; write to ./- if you mean that"});
+    };
+    expectRefused({"cook", level(), "-o", "-"}, "--output");
+    expectRefused({"cook", level(), "-o", file("other.dimmer"), "--write-level", "-"}, "--write-level");
+    expectRefused({"cook", level(), "-o", file("other.dimmer"), "--report", "-"}, "--report");
+    expectRefused({"report", pack(), "-o", "-"}, "--output");
+    expectRefused({"verify", level(), pack(), "--csv", "-"}, "--csv");
+    expectRefused({"verify", level(), pack(), "--heatmap", "-"}, "--heatmap", "folder");
+    expectRefused({"bench", pack(), "--plot", "-"}, "--plot");
+    expectRefused({"synth", "--like", "safehouse", "-o", "-"}, "--output");
+    expectRefused({"export", pack(), "-"}, "DIR", "folder");
+    EXPECT_FALSE(std::filesystem::exists("-"));
+    EXPECT_FALSE(std::filesystem::exists(file("other.dimmer")));
+    const auto printed = runDimmer({"sample", pack(), "--points", points(), "-o", "-"});
+    EXPECT_EQ(printed.exit_code, 0) << printed.err;
+    EXPECT_THAT(printed.out, HasSubstr("Er,Eg,Eb"));
+}
+
+// It is made before the bake, and its name would be taken then.
+TEST_F(Outputs, NeverTheCache) {
+    const std::string new_pack = file("other.dimmer"), folder = file("new_cache");
+    expectSameFile({"cook", level(), "-o", new_pack, "--cache", new_pack}, "--output", "--cache");
+    expectSameFile({"cook", level(), "-o", new_pack, "--report", folder, "--cache", folder}, "--report", "--cache");
+    std::filesystem::create_directory(file("empty"));
+    expectSameFile({"cook", level(), "-o", file("empty/.dimmer-cache")}, "--output", "--cache");
+    for (const std::string& path : {new_pack, folder, file("empty/.dimmer-cache")})
+        EXPECT_FALSE(std::filesystem::exists(path)) << path;
+}
+
+TEST_F(Outputs, WhatIsReadOnlyStays) {
+    const std::string kept = write("kept.dimmer", "kept");
+    std::filesystem::permissions(kept, std::filesystem::perms(0444));
+    expectRefusedAtOnce({"cook", level(), "-o", kept}, {"kept.dimmer", "is read-only"});
+    EXPECT_EQ(readText(kept), "kept");
+}
+
 TEST_F(Outputs, DevicesMayServeTwice) {
     const auto result = runDimmer({"bench", pack(), "--mode", "cpu", "--frames", "1", "--only", "nothing", "--json",
                                    "/dev/null", "--plot", "/dev/null"});

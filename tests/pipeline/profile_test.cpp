@@ -163,6 +163,14 @@ TEST(Profile, SettingsSayWhereTheyComeFrom) {
     EXPECT_EQ(profile->settingsJson("preview"), profile->settingsJson("preview"));
 }
 
+TEST(Profile, AFileNameThatIsNoUtf8IsNoReasonToFail) {
+    const TemporaryFolder folder;
+    const auto profile = loadProfile(writeText(folder, "m\xff.json", R"({"records": {"threshold": 0.1}})").string());
+    ASSERT_TRUE(profile.has_value()) << profile.error().message;
+    const json settings = json::parse(profile->settingsJson("preview"));
+    EXPECT_EQ(settings["records.threshold"]["from"], "m\xef\xbf\xbd.json");  // U+FFFD in the place of what is no UTF-8
+}
+
 TEST(Profile, Qualities) {
     const auto profile = loadProfile("desktop");
     ASSERT_TRUE(profile.has_value());

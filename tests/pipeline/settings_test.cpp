@@ -146,6 +146,29 @@ TEST(Settings, MistakesOfLevelAndCommandLine) {
     EXPECT_FALSE(std::filesystem::exists(folder.path / "level.dimmer"));
 }
 
+// A profile has settings for every quality; the command line names one for a reason. From the cache it says so too.
+TEST(Settings, TheCommandLineIsToldWhatDoesNothingAtThisQuality) {
+    const TemporaryFolder folder;
+    const auto level = writeLevel(folder, twoCells());
+    const auto profile = writeText(folder, "mine.json", R"({"bake": {"final": {"bounces": 9},
+        "draft": {"samples_per_texel": 1, "series_rays": 4, "emitter_samples": 1}}})");
+    for (int round = 0; round < 2; ++round) {
+        SilentProgress silent;
+        const auto result = cook({.level = level,
+                                  .pack = folder.path / "level.dimmer",
+                                  .profile = profile.string(),
+                                  .quality = "draft",
+                                  .set = {"bake.final.rays=7", "bake.draft.rays=4"},
+                                  .cache = folder.path / "cache"},
+                                 silent);
+        ASSERT_TRUE(result.has_value()) << result.error().message;
+        EXPECT_THAT(result->stats.warnings,
+                    testing::Contains(AllOf(HasSubstr("--set bake.final.rays"), HasSubstr("'draft'"))));
+        for (const char* unsaid : {"bake.draft", "bounces"})
+            EXPECT_THAT(result->stats.warnings, testing::Not(testing::Contains(HasSubstr(unsaid)))) << round;
+    }
+}
+
 // One profile serves many levels: what it says of a set that this one has not is a warning that names the profile.
 TEST(Settings, AProfileMayNameSetsOfOtherLevels) {
     const TemporaryFolder folder;

@@ -1,0 +1,115 @@
+// What `--fit` begins where budgets are far off, and what it says where it cannot end well.
+#include <gmock/gmock.h>
+#include <pipeline/fit.h>
+#include <pipeline/small_level.h>
+
+namespace dimmer::cook::test {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+PackData withGlobalProbes(size_t probes) {
+    PackData pack;
+    pack.probes.global.positions.resize(probes);
+    return pack;
+}
+
+// One chart of 40 x 40 texels.
+LossTable oneChart(bool fixed) {
+    return LossTable(Baked{}, Texels{}, {}, {.page_size = 64, .charts = {{40, 40}}, .fixed = {fixed}});
+}
+
+// 128 kB of 50, of which a grid of 28 kB can save only a part.
+TEST(FitLimits, AGridWithABudgetOfItsOwnIsCutThoughTheTotalAsksForMore) {
+    const PackData pack = withGlobalProbes(1000);
+    PackCost cost;
+    cost.base_lightmap = 100000;
+    cost.global_grid = 28000;
+    Profile profile;
+    profile.budget_total = 50000;
+    profile.budget_global_grid = 14000;
+    const Remedy first = fittingRemedy(pack, cost, profile, {});
+    ASSERT_EQ(first.changes.size(), 1u);
+    EXPECT_EQ(first.changes[0].key, "grids.probes_max");
+    EXPECT_NEAR(first.changes[0].to, 0.97 * 500 - 8, 1);  // half of them, a little less, but for the box's corners
+    EXPECT_FALSE(first.fits);
+    const auto named = remedies(pack, cost, profile, {});
+    EXPECT_TRUE(std::ranges::any_of(named, [&](const Remedy& r) { return r.changes == first.changes; }));
+    // And in the next round the total.
+    cost.global_grid = 14000;
+    const Remedy second = fittingRemedy(withGlobalProbes(500), cost, profile, {});
+    EXPECT_TRUE(second.fits);
+    EXPECT_EQ(second.changes.at(0).key, "lightmaps.texels_per_metre");
+}
+
+TEST(FitLimits, DensityIsLeftAloneWhereEverySurfaceHasItsOwn) {
+    PackCost cost;
+    cost.base_lightmap = 2000;
+    Profile profile;
+    profile.budget_base_lightmaps = 1000;
+    EXPECT_TRUE(fittingRemedy({}, cost, profile, oneChart(true)).changes.empty());
+    EXPECT_TRUE(remedies({}, cost, profile, oneChart(true)).empty());
+    EXPECT_EQ(fittingRemedy({}, cost, profile, oneChart(false)).changes.size(), 1u);
+}
+
+// Texels 16 times as long are the coarsest that are taken: 1/256 of the bytes.
+TEST(FitLimits, NothingIsBegunThatTheCoarsestPagesDoNotEnd) {
+    PackCost cost;
+    cost.base_lightmap = 256000;
+    Profile profile;
+    profile.budget_base_lightmaps = 999;
+    EXPECT_TRUE(fittingRemedy({}, cost, profile, {}).changes.empty());
+    // What would help without being enough is still named.
+    const auto named = remedies({}, cost, profile, {});
+    ASSERT_EQ(named.size(), 1u);
+    EXPECT_FALSE(named[0].fits);
+    profile.budget_base_lightmaps = 1000;
+    EXPECT_EQ(fittingRemedy({}, cost, profile, {}).changes.size(), 1u);
+    // A grid that is over would be cut in vain.
+    profile.budget_base_lightmaps = 999;
+    profile.budget_global_grid = 14000;
+    cost.global_grid = 28000;
+    EXPECT_TRUE(fittingRemedy(withGlobalProbes(1000), cost, profile, {}).changes.empty());
+}
+
+// Fixed pages of 20 kB and a grid of 80: of 30 kB the grid's share would be 24, but 10 are left for it.
+TEST(FitLimits, ProbesGiveAllWhereTexelsGiveNothing) {
+    PackCost cost;
+    cost.base_lightmap = 20000;
+    cost.global_grid = 80000;
+    Profile profile;
+    profile.budget_total = 30000;
+    const Remedy remedy = fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true));
+    ASSERT_EQ(remedy.changes.size(), 1u);
+    EXPECT_EQ(remedy.changes[0].key, "grids.probes_max");
+    EXPECT_NEAR(remedy.changes[0].to, 0.97 * 125 - 8, 1);
+    EXPECT_TRUE(remedy.fits);
+}
+
+// No grid of a model has less than 8 probes: one round finds that out, and its figures are not those of the settings
+// that were asked for.
+TEST(FitLimits, TheErrorTellsWhatHadBeenChanged) {
+    const TemporaryFolder folder;
+    LevelFile level = twoCells();
+    const int crate = level.addNode({{"name", "crate"}, {"mesh", addRoomMesh(level, {0, 0, 0}, 1, addWhite(level))}});
+    level.node(crate)["translation"] = {0.5, 0.5, 0.5};
+    level.node(crate)["extras"] = {{"dimmer_lighting", "local_grid"}};
+    const auto profile = writeText(folder, "tight.json", R"({"budgets": {"local_grids": 1}, "grids": {"global": "off"},
+        "bake": {"draft": {"samples_per_texel": 1, "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
+    CookOptions options{.level = writeLevel(folder, level),
+                        .pack = folder.path / "level.dimmer",
+                        .profile = profile.string(),
+                        .quality = "draft"};
+    options.fit = true;
+    SilentProgress silent;
+    const auto result = cook(options, silent);
+    ASSERT_FALSE(result.has_value());
+    EXPECT_EQ(result.error().code, ErrorCode::OverBudget);
+    EXPECT_THAT(result.error().message, AllOf(HasSubstr("local grids: "), HasSubstr("--fit had changed"),
+                                              testing::ContainsRegex("grids.local_probes_max [0-9]+ -> 8: saves")));
+    EXPECT_FALSE(std::filesystem::exists(options.pack));
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
