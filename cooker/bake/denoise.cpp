@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 #include <pack/pack_data.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -16,6 +17,13 @@ constexpr std::array<float, 3> kernel = {3.0f / 8, 1.0f / 4, 1.0f / 16};  // B3 
 // The smoothing of a variance: a texel's own estimate comes from a handful of rounds and says little alone.
 constexpr int variance_reach = 1;
 
+// Directional light is averaged as it is stored, by the tangent frame.
+constexpr float same_frame_cos = 0.99f;
+// An unwrap of the level's own may stretch texels: longer than a square one of their area by so much.
+constexpr float stretch_max = 1.5f;
+// Off the plane, of the way to a neighbour: above what frames that agree curve, below a step of stairs.
+constexpr float off_plane_share = 0.25f;
+
 class LightmapFilter {
    public:
     LightmapFilter(const Unwrap& unwrap, const Texels& texels, const Sparse<ReceiverLight>& light, int step)
@@ -27,7 +35,7 @@ class LightmapFilter {
         std::vector<Sum> sums(here.size());
         for (int dy = -2; dy <= 2; ++dy)
             for (int dx = -2; dx <= 2; ++dx) {
-                const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx * step_, dy * step_);
+                const uint32_t other = neighbour(receiver, dx * step_, dy * step_);
                 if (other == no_index) continue;
                 const float spatial =
                     kernel[static_cast<size_t>(std::abs(dx))] * kernel[static_cast<size_t>(std::abs(dy))];
@@ -47,7 +55,7 @@ class LightmapFilter {
         std::vector<float> counts(here.size(), 1);
         for (int dy = -variance_reach; dy <= variance_reach; ++dy)
             for (int dx = -variance_reach; dx <= variance_reach; ++dx) {
-                const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx, dy);
+                const uint32_t other = neighbour(receiver, dx, dy);
                 if (other == no_index || other == receiver) continue;
                 forEachCommon(here, light_.row(other), [&](size_t i, const ReceiverLight& o) {
                     row[i].variance += o.variance;
@@ -62,6 +70,32 @@ class LightmapFilter {
         Gathered light;
         float weight = 0, variance = 0;
     };
+
+    // The receiver so many texels away on the same surface; no_index where there is none.
+    uint32_t neighbour(size_t receiver, int dx, int dy) const {
+        const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx, dy);
+        if (other == no_index || other == receiver) return other;
+        const SamplePoint &a = texels_.sample(receiver, 0), &b = texels_.sample(other, 0);
+        if (a.face == b.face || !unwrap_.charts[unwrap_.face_chart[a.face]].of_file) return other;
+        return framesAgree(a.face, b.face) && nearInSpace(a, b, dx, dy) ? other : no_index;
+    }
+
+    bool framesAgree(uint32_t a, uint32_t b) const {
+        const TangentFrame &f = unwrap_.frames[a], &g = unwrap_.frames[b];
+        return glm::dot(f.normal, g.normal) > same_frame_cos && glm::dot(f.tangent, g.tangent) > same_frame_cos &&
+               glm::dot(f.bitangent, g.bitangent) > same_frame_cos;
+    }
+
+    // As near as texels of one plane are, wherever in them samples lie: islands lie side by side on the page alone, and
+    // may lie in parallel planes. By whole texels' size: what a border cuts off leaves them as far apart.
+    bool nearInSpace(const SamplePoint& a, const SamplePoint& b, int dx, int dy) const {
+        const float size_m = std::sqrt(std::max(unwrap_.texel_area_m2[a.face], unwrap_.texel_area_m2[b.face]));
+        const glm::vec3 way = b.position_m - a.position_m;
+        const float off_plane_m = std::abs(glm::dot(way, unwrap_.frames[a.face].normal));
+        const auto side = [](int texels) { return static_cast<float>(std::abs(texels) + 1); };
+        return glm::length(way) <= stretch_max * std::hypot(side(dx), side(dy)) * size_m &&
+               off_plane_m <= off_plane_share * std::max(glm::length(way), size_m);
+    }
 
     // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
     static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {

@@ -7,7 +7,8 @@ namespace dimmer::cook {
 
 // An edge-avoiding a-trous wavelet filter (Dammertz et al. 2010), guided by each texel's own variance: texels are
 // averaged with others of the same chart whose light of the same group differs by no more than their noise explains.
-// Charts are flat, so normals agree within one. Light groups are filtered apart. Deterministic.
+// A chart that came with the level may hold many islands, and curved ones: only what goes on one surface, and tells
+// directions by the same tangent frame, is averaged. Light groups are filtered apart. Deterministic.
 Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
                               Progress& progress);
 

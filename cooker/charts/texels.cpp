@@ -8,6 +8,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace dimmer::cook {
 namespace {
@@ -77,12 +78,7 @@ class TexelSampler {
         for (const glm::vec2 within : tries_) {
             if (result.points.size() >= samples_max_) break;
             if (result.points.empty() && usable.dropped >= drops_max) break;
-            const glm::vec2 p = glm::vec2(x, y) + within;
-            for (const Covered& c : faces)
-                if (auto b = barycentric(unwrap_.uv_texels[c.face], p)) {
-                    tryPoint({c.face, *b}, usable, result);
-                    break;
-                }
+            if (const auto at = surfaceAt(faces, glm::vec2(x, y) + within)) tryPoint(*at, usable, result);
         }
         float largest = 0;
         SurfacePoint centroid{};
@@ -97,7 +93,11 @@ class TexelSampler {
         if (usable.tried == 0 && largest > 0) tryPoint(centroid, usable, result);
         // All of it lies in a closed door's leaf: what an opening uncovers.
         if (result.points.empty()) result.points = std::move(usable.in_leaf);
-        if (usable.tried > 0) result.reflectance /= static_cast<float>(usable.tried);
+        // Few points may all lie in holes of what rays do hit.
+        if (usable.tried > 0 && usable.alpha == 0)
+            for (const glm::vec2 within : tries_)
+                if (const auto at = surfaceAt(faces, glm::vec2(x, y) + within)) addReflectance(*at, usable, result);
+        if (usable.alpha > 0) result.reflectance /= usable.alpha;
         if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(result.points);
         return result;
     }
@@ -114,6 +114,12 @@ class TexelSampler {
         return sum / static_cast<float>(polygon.size());
     }
 
+    std::optional<SurfacePoint> surfaceAt(std::span<const Covered> faces, glm::vec2 p) const {
+        for (const Covered& c : faces)
+            if (const auto weights = barycentric(unwrap_.uv_texels[c.face], p)) return SurfacePoint{c.face, *weights};
+        return std::nullopt;
+    }
+
     glm::vec2 weightsAt(uint32_t face, glm::vec2 p) const {
         const auto& t = unwrap_.uv_texels[face];
         const float area = cross2d(t[1] - t[0], t[2] - t[0]);
@@ -123,6 +129,7 @@ class TexelSampler {
 
     struct Usable {
         uint32_t tried = 0, dropped = 0;
+        float alpha = 0;                   // sum over what the reflectance was added up over
         std::vector<SamplePoint> in_leaf;  // of the dropped ones
     };
 
@@ -130,9 +137,7 @@ class TexelSampler {
         const uint32_t triangle = unwrap_.faces[s.face].triangle;
         const glm::vec3 position =
             rays_.pointOn(triangle, s.weights.x, s.weights.y) + unwrap_.frames[s.face].normal * lift_m;
-        const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
-        result.reflectance +=
-            rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
+        addReflectance(s, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
         if (!insideGeometry(s.face, nearest)) {
@@ -143,6 +148,16 @@ class TexelSampler {
         const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
         if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !insideGeometry(s.face, stays))
             usable.in_leaf.push_back({position, s.face});
+    }
+
+    // Light that hits a texel hits it where it is not cut out: colours count by how much of it they stop.
+    void addReflectance(const SurfacePoint& s, Usable& usable, Result& result) const {
+        const uint32_t triangle = unwrap_.faces[s.face].triangle;
+        const float alpha = rays_.alphaAt(triangle, s.weights.x, s.weights.y);
+        const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
+        result.reflectance +=
+            alpha * rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
+        usable.alpha += alpha;
     }
 
     // Without the leaves of doors, but for one that the triangle itself is of.

@@ -22,9 +22,9 @@ struct FillTexel {
 
 struct Texels {
     // Per receiver, structure of arrays.
-    std::vector<uint32_t> address;  // TexelAddress
-    std::vector<float> area_m2;     // lit surface inside it
-    std::vector<glm::vec3> reflectance;
+    std::vector<uint32_t> address;       // TexelAddress
+    std::vector<float> area_m2;          // lit surface inside it
+    std::vector<glm::vec3> reflectance;  // of what stops light there; 0 where nothing does
     std::vector<uint32_t> first_sample;  // one more than receivers
     std::vector<SamplePoint> samples;
     std::vector<FillTexel> fills;

@@ -20,6 +20,7 @@ struct Placed {
     uint32_t width = 0, height = 0;
     std::vector<uint32_t> faces;
     std::vector<std::array<glm::vec2, 3>> uv_texels;
+    bool of_file = false;
 };
 
 std::array<glm::vec3, 3> corners(const RayScene& rays, Face face) {
@@ -78,7 +79,8 @@ Placed fileChart(const RayScene& rays, Unwrap& out, std::vector<uint32_t> ids, f
     Placed placed{static_cast<uint32_t>(size.x) + 2 * padding_texels,
                   static_cast<uint32_t>(size.y) + 2 * padding_texels,
                   std::move(ids),
-                  {}};
+                  {},
+                  true};
     for (uint32_t id : placed.faces) {
         std::array<glm::vec2, 3> uv;
         for (int i = 0; i < 3; ++i)
@@ -280,7 +282,8 @@ Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
     out.face_chart.resize(count);
     out.frames.resize(count);
     out.texel_area_m2.resize(count);
-    for (uint32_t c = 0; c < charts.size(); ++c)
+    for (uint32_t c = 0; c < charts.size(); ++c) {
+        out.charts[c].of_file = charts[c].of_file;
         for (size_t i = 0; i < charts[c].faces.size(); ++i) {
             const uint32_t id = charts[c].faces[i];
             const Face face = out.faces[id];
@@ -292,6 +295,7 @@ Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
                                                 rays.corner(face.triangle, 2)};
             out.frames[id] = tangentFrame(p, out.uv_texels[id], face.back ? -normal : normal, out.texel_area_m2[id]);
         }
+    }
     return out;
 }
 

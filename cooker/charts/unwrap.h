@@ -23,6 +23,7 @@ struct Face {
 // A rectangle of texels on a page; its outermost ring is padding for bilinear filtering.
 struct Chart {
     uint32_t page = 0, x = 0, y = 0, width = 0, height = 0;
+    bool of_file = false;  // a mesh's own unwrap: islands side by side, curved ones too; else it is of one plane
 };
 
 // A right- or left-handed tangent frame: `tangent` is the direction of increasing u, `bitangent` that of increasing v,

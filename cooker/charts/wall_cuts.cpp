@@ -1,5 +1,6 @@
 #include <charts/wall_cuts.h>
 
+#include <charts/box_tree.h>
 #include <charts/file_uv.h>
 #include <charts/planar.h>
 
@@ -18,6 +19,7 @@ constexpr float reach_texels = 2.5f;     // thinner than this leaks: bilinear fi
 constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
 constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
 constexpr float margin_m = 5e-3f;        // a cut this close to a rectangle's edge parts nothing
+constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
 struct Trace {
@@ -72,6 +74,12 @@ class WallCutter {
         addFaces(false, texels_per_metre);
         cuttable_ = faces_.size();
         addFaces(true, texels_per_metre);
+        std::vector<BoxTree::Box> boxes;
+        for (const uint32_t f : blocking_) {
+            boxes.push_back(BoxTree::boxOf(faces_[f].corners_m));
+            largest_m_ = std::max({largest_m_, largest(boxes.back().min_m), largest(boxes.back().max_m)});
+        }
+        blocking_boxes_ = BoxTree(std::move(boxes));
     }
 
     void run() {
@@ -102,6 +110,8 @@ class WallCutter {
     };
     using Replacements = std::map<uint32_t, std::vector<Replacement>>;
 
+    static float largest(glm::vec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
+
     void addFaces(bool of_unwraps, float texels_per_metre) {
         for (uint32_t m = 0; m < scene_.meshes.size(); ++m) {
             const SceneMesh& mesh = scene_.meshes[m];
@@ -110,9 +120,10 @@ class WallCutter {
                 std::array<glm::vec3, 3> c;
                 for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];
                 const glm::vec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
+                if (scene_.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque)
+                    blocking_.push_back(static_cast<uint32_t>(faces_.size()));
                 faces_.push_back({c, normal, mesh.texels_per_metre.value_or(texels_per_metre), chartGroup(mesh)});
                 sources_.push_back({m, t});
-                blocks_.push_back(scene_.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque);
             }
         }
     }
@@ -161,13 +172,31 @@ class WallCutter {
         return both;
     }
 
+    // What holds every trace that counts on the plane dot(normal, p) = height over a chart's rectangle. The normal of
+    // one of its faces may differ from the chart's own by a rounding step.
+    BoxTree::Box boxOver(const PlanarChart& chart, glm::vec3 normal, float height) const {
+        const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis);
+        std::array<glm::vec3, 4> corners;
+        for (uint32_t i = 0; i < 4; ++i) {
+            const glm::vec2 at = chart.min_m + chart.size_m * glm::vec2(i & 1, i >> 1);
+            const glm::vec3 flat = at.x * chart.u_axis + at.y * chart.v_axis;
+            corners[i] = flat + up * ((height - glm::dot(normal, flat)) / glm::dot(normal, up));
+        }
+        BoxTree::Box box = BoxTree::boxOf(corners);
+        const float reach_m =
+            margin_m + same_line_m + rounding_share * std::max({largest_m_, largest(box.min_m), largest(box.max_m)});
+        box.min_m -= reach_m;
+        box.max_m += reach_m;
+        return box;
+    }
+
     std::vector<Trace> findTraces(const PlanarChart& chart, float height_m) const {
         const PlanarFace& any = faces_[chart.faces[0]];
         const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
         const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
         std::vector<Trace> traces;
-        for (uint32_t f = 0; f < faces_.size(); ++f) {
-            if (!blocks_[f]) continue;
+        for (const uint32_t near : blocking_boxes_.touching(boxOver(chart, any.normal, height))) {
+            const uint32_t f = blocking_[near];
             const PlanarFace& face = faces_[f];
             std::array<float, 3> d;
             for (size_t i = 0; i < 3; ++i) d[i] = glm::dot(any.normal, face.corners_m[i]) - height;
@@ -318,8 +347,10 @@ class WallCutter {
     Scene& scene_;
     std::vector<PlanarFace> faces_;
     std::vector<Source> sources_;
-    std::vector<bool> blocks_;
     size_t cuttable_ = 0;  // the first so many faces; the others' meshes bring an unwrap, and they only block
+    std::vector<uint32_t> blocking_;  // faces, ascending
+    BoxTree blocking_boxes_;          // theirs
+    float largest_m_ = 0;             // coordinate among theirs
 };
 
 }  // namespace

@@ -74,7 +74,13 @@ float areaPerPoint(const SceneModel& model) {
     return side * side;
 }
 
-// visit(point, normal, area, reflectance) for points spread over a model's lit sides.
+// What light finds at a point of a surface.
+struct Reflector {
+    float alpha = 1;  // the share that is stopped there
+    glm::vec3 reflectance{0};
+};
+
+// visit(point, normal, area, reflector) for points spread over a model's lit sides.
 void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
     const Scene& scene = rays.scene();
     const float area_per_point = areaPerPoint(scene.models[model]);
@@ -88,10 +94,10 @@ void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
         for (uint32_t i = 0; i < points; ++i) {
             const glm::vec2 square = sequence2d(i, t);
             const float root = std::sqrt(square.x), u = root * (1 - square.y), v = root * square.y;
-            const glm::vec3 rho = material.reflectance(glm::vec3(rays.surfaceColor(t, u, v)));
-            visit(rays.pointOn(t, u, v), triangle.normal, area / static_cast<float>(points), rho);
+            const Reflector at{rays.alphaAt(t, u, v), material.reflectance(glm::vec3(rays.surfaceColor(t, u, v)))};
+            visit(rays.pointOn(t, u, v), triangle.normal, area / static_cast<float>(points), at);
             if (material.double_sided)
-                visit(rays.pointOn(t, u, v), -triangle.normal, area / static_cast<float>(points), rho);
+                visit(rays.pointOn(t, u, v), -triangle.normal, area / static_cast<float>(points), at);
         }
     });
 }
@@ -209,16 +215,17 @@ void ModelReceivers::makeReceivers(uint32_t index) {
     const SceneModel& scene_model = rays_.scene().models[index];
     model.slots.fill(no_index);
     glm::vec3 reflected(0);
-    float area_m2 = 0;
-    forSurface(rays_, index, [&](glm::vec3, glm::vec3 normal, float area, glm::vec3 rho) {
+    float stopping_m2 = 0;  // without what is cut out, where no ray ends
+    forSurface(rays_, index, [&](glm::vec3, glm::vec3 normal, float area, const Reflector& at) {
         const NearNormals near = nearNormals(normal);
         for (size_t i = 0; i < 3; ++i)
             if (near.share[i] > 0 && model.slots[near.index[i]] == no_index)
                 model.slots[near.index[i]] = model.slot_count++;
-        reflected += area * rho;
-        area_m2 += area;
+        const float stops_m2 = at.alpha * area;
+        reflected += stops_m2 * at.reflectance;
+        stopping_m2 += stops_m2;
     });
-    if (area_m2 > 0) model.reflectance = reflected / area_m2;
+    if (stopping_m2 > 0) model.reflectance = reflected / stopping_m2;
     model.first_receiver = static_cast<uint32_t>(model_.size());
     const uint32_t probes = scene_model.probes.x * scene_model.probes.y * scene_model.probes.z;
     const size_t first = area_m2_.size(), count = size_t{probes} * model.slot_count;
@@ -226,7 +233,7 @@ void ModelReceivers::makeReceivers(uint32_t index) {
     model_.resize(first + count, index);
     std::vector<DrawnPoints> drawn(count);
     std::vector<glm::vec3> surface;
-    forSurface(rays_, index, [&](glm::vec3 point, glm::vec3 normal, float area, glm::vec3) {
+    forSurface(rays_, index, [&](glm::vec3 point, glm::vec3 normal, float area, const Reflector&) {
         const NearNormals normals = nearNormals(normal);
         const NearProbes near = nearProbes(scene_model, point);
         const auto number = static_cast<uint32_t>(surface.size());

@@ -6,6 +6,7 @@
 #include <scene/open_pose.h>
 
 #include <algorithm>
+#include <memory>
 
 namespace dimmer::cook::test {
 namespace {
@@ -68,6 +69,47 @@ TEST(Texels, OfAThinRugAreNotTheFloors) {
             EXPECT_EQ(texels.sample(i, s).position_m.y > 0.003f, is_rug);
     }
     EXPECT_EQ(of_rug, 64u);  // 2 m x 2 m
+}
+
+// What the 64 texels of a floor reflect, all of them the same: in each lies a whole texture of 64 columns, along +Z.
+float reflectanceOfTexels(AlphaMode mode, auto&& column) {
+    Texture texture{64, 1, TransferFunction::Linear, {}};
+    for (uint32_t x = 0; x < 64; ++x) texture.texels.push_back(column(x));
+    Scene scene;
+    scene.textures.push_back(std::make_shared<const Texture>(std::move(texture)));
+    Material leaves = lambert(1);
+    leaves.alpha_mode = mode;
+    leaves.base_color_texture = 0;
+    addFloor(scene, 1, addMaterial(scene, leaves)).uv0 = {{0, 0}, {8, 0}, {8, 0}, {0, 0}};
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 64});
+    if (!charts) return -1;
+    const Texels texels = sampleTexels(rays, *charts, 4);
+    EXPECT_EQ(texels.size(), 64u);
+    const float found = texels.reflectance[0].y;
+    for (const glm::vec3 r : texels.reflectance) EXPECT_NEAR(r.y, found, 1e-5f);
+    return found;
+}
+
+// Light that a texel gets from other surfaces is told by rays that hit it: they pass where it is cut out, whatever
+// colour the texture has there. 51 of 255 is 0.2. Of a texel's 4 points 2 lie in each half, a twentieth off its edges.
+TEST(Texels, ReflectByWhatIsNotCutOut) {
+    constexpr glm::u8vec4 leaf(51, 51, 51, 255), hole(255, 255, 255, 0), glass(204, 204, 204, 51);
+    const auto half = [](glm::u8vec4 right) { return [=](uint32_t x) { return x < 32 ? leaf : right; }; };
+    EXPECT_NEAR(reflectanceOfTexels(AlphaMode::Mask, half(hole)), 0.2f, 1e-5f);
+    EXPECT_NEAR(reflectanceOfTexels(AlphaMode::Blend, half(hole)), 0.2f, 1e-5f);
+    // Of 0.8 and stopping a fifth: (0.2 + 0.2 * 0.8) / 1.2.
+    EXPECT_NEAR(reflectanceOfTexels(AlphaMode::Blend, half(glass)), 0.3f, 1e-5f);
+    // Alpha means nothing there: a mean of 0.2 and 0.8.
+    EXPECT_NEAR(reflectanceOfTexels(AlphaMode::Opaque, half(glass)), 0.5f, 1e-5f);
+}
+
+// The points lie at ninths along the texture: none within a 32nd of its middle, where of 64 that are tried one does.
+TEST(Texels, ReflectByWhatTheirPointsMiss) {
+    constexpr glm::u8vec4 twig(51, 51, 51, 255), hole(255, 255, 255, 0);
+    const auto middle = [](uint32_t x) { return x == 31 || x == 32 ? twig : hole; };
+    EXPECT_NEAR(reflectanceOfTexels(AlphaMode::Mask, middle), 0.2f, 1e-5f);
+    EXPECT_EQ(reflectanceOfTexels(AlphaMode::Mask, [](uint32_t) { return hole; }), 0);
 }
 
 // A sliding door that moves by its width: the open leaf goes on where the closed one ends, and is another surface.

@@ -5,6 +5,10 @@
 #include <charts/wall_cuts.h>
 #include <gtest/gtest.h>
 
+#include <glm/gtc/matrix_transform.hpp>
+
+#include <map>
+
 namespace dimmer::cook::test {
 namespace {
 
@@ -94,6 +98,83 @@ TEST(WallCuts, ARowOfPillarsIsNoWall) {
         const size_t before = scene.meshes[3].triangles.size();  // the floor's upper side
         cutAtWalls(scene, density);
         EXPECT_EQ(scene.meshes[3].triangles.size(), before) << density;
+    }
+}
+
+// What blocks elsewhere, however far and of whatever size, cuts nothing here: not a bit of the rooms changes.
+TEST(WallCuts, MeshesElsewhereChangeNothing) {
+    Scene rooms = twoRooms(), level = twoRooms();
+    for (int i = 0; i < 400; ++i) {
+        const glm::vec3 at(7 + 3 * static_cast<float>(i % 20), static_cast<float>(i % 7), static_cast<float>(i / 20));
+        addSolid(level, "crate", at, glm::vec3(0.1f + 0.02f * static_cast<float>(i % 5)), 0);
+    }
+    addSolid(level, "hill", {-3000, 0, 2000}, {500, 300, 800}, 0);
+    cutAtWalls(rooms, 4);
+    cutAtWalls(level, 4);
+    const size_t floor = 3;  // its upper side
+    EXPECT_GT(rooms.meshes[floor].triangles.size(), 2u);
+    for (size_t m = 0; m < rooms.meshes.size(); ++m) {
+        EXPECT_TRUE(level.meshes[m].positions_m == rooms.meshes[m].positions_m) << m;
+        EXPECT_TRUE(level.meshes[m].triangles == rooms.meshes[m].triangles) << m;
+        EXPECT_TRUE(level.meshes[m].triangle_regions == rooms.meshes[m].triangle_regions) << m;
+    }
+}
+
+// One floor under 8 x 8 rooms of 4 m: between any two that are neighbours stands a solid of its own, 0.2 m thick, from
+// corner to corner but for 0.1 m at each.
+constexpr int rooms_a_side = 8;
+constexpr float room_m = 4;
+Scene manyRooms(const glm::dmat4& pose) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    constexpr float half_m = 0.5f * rooms_a_side * room_m;
+    addQuad(scene, "floor", {half_m, 0, half_m}, {0, 0, half_m}, {half_m, 0, 0}, white);
+    constexpr float stretch_m = 0.5f * room_m - half_wall_m;
+    for (int i = 1; i < rooms_a_side; ++i)
+        for (int k = 0; k < rooms_a_side; ++k) {
+            const float across = room_m * static_cast<float>(i), along = room_m * (static_cast<float>(k) + 0.5f);
+            addSolid(scene, "wall", {across, 1.35f, along}, {half_wall_m, 1.35f, stretch_m}, white);
+            addSolid(scene, "wall", {along, 1.35f, across}, {stretch_m, 1.35f, half_wall_m}, white);
+        }
+    for (SceneMesh& mesh : scene.meshes) {
+        for (glm::vec3& p : mesh.positions_m) p = glm::vec3(pose * glm::dvec4(p, 1));
+        for (glm::vec3& n : mesh.normals) n = glm::vec3(glm::dmat3(pose) * glm::dvec3(n));
+    }
+    return scene;
+}
+
+// Each piece of the floor, and each region, is of one room; nothing of the floor is lost.
+void expectOneRoomEach(const SceneMesh& floor, const glm::dmat4& pose) {
+    ASSERT_EQ(floor.triangle_regions.size(), floor.triangles.size());
+    std::map<uint32_t, glm::ivec2> room_of_region;
+    double area = 0;
+    for (size_t t = 0; t < floor.triangles.size(); ++t) {
+        std::array<glm::dvec3, 3> c;
+        for (int i = 0; i < 3; ++i)
+            c[static_cast<size_t>(i)] = glm::inverse(pose) * glm::dvec4(floor.positions_m[floor.triangles[t][i]], 1);
+        area += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+        const glm::dvec3 middle = (c[0] + c[1] + c[2]) / 3.0;
+        const glm::ivec2 room(glm::floor(glm::dvec2(middle.x, middle.z) / double{room_m}));
+        EXPECT_EQ(room_of_region.try_emplace(floor.triangle_regions[t], room).first->second, room) << t;
+        // Cuts lie in the walls' middle; coordinates around 1000 m come in steps of 6e-5 m, of which some add up.
+        for (const glm::dvec3& p : c) {
+            const glm::dvec2 within = glm::dvec2(p.x, p.z) - double{room_m} * glm::dvec2(room);
+            EXPECT_TRUE(glm::all(glm::greaterThan(within, glm::dvec2(-2e-3)))) << t;
+            EXPECT_TRUE(glm::all(glm::lessThan(within, glm::dvec2(double{room_m} + 2e-3)))) << t;
+        }
+    }
+    EXPECT_GE(room_of_region.size(), size_t{rooms_a_side * rooms_a_side});
+    const double whole = double{rooms_a_side * room_m} * double{rooms_a_side * room_m};
+    EXPECT_NEAR(area, whole, 1e-4 * whole);
+}
+
+// Level and around the origin; and on a ramp, a kilometre off.
+TEST(WallCuts, EachOfManyRoomsHasItsFloorToItself) {
+    const glm::dmat4 ramp = glm::rotate(glm::translate(glm::dmat4(1), {1000, 200, -500}), std::atan(0.75), {1, 0, 0});
+    for (const glm::dmat4& pose : {glm::dmat4(1), ramp}) {
+        Scene scene = manyRooms(pose);
+        cutAtWalls(scene, 4);
+        expectOneRoomEach(scene.meshes[0], pose);
     }
 }
 
