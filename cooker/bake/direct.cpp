@@ -29,7 +29,7 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
         const float weight = Light::Intake::weight(direction);
         if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) return;
         ++traced;
-        const float distance_m = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
+        const float distance_m = shadowRayLengthM(lit);
         forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
                    [&](float passed, uint32_t path) {
                        const uint32_t term = paths.term(groupOf(light.light_set), path);

@@ -111,7 +111,8 @@ std::vector<DoorIndices> doorsInSight(const RayScene& rays) {
     const auto doors = static_cast<uint32_t>(rays.scene().doors.size());
     const auto inSight = [&](uint32_t a, uint32_t b) {
         for (uint32_t i = 0; i < sight_rays; ++i) {
-            const auto from = leaves.point(a, i), to = leaves.point(b, i);
+            // One sequence for both would join points at one distance from each other alone.
+            const auto from = leaves.point(a, i), to = leaves.point(b, hash(i));
             if (!from || !to) return false;
             const glm::vec3 way = *to - *from;
             const float distance = glm::length(way);

@@ -11,11 +11,11 @@
 namespace dimmer::cook {
 namespace {
 
-// An emitter with less than this share of its group's light in a cell is left to the gather rays: they still find it,
-// with full weight, so nothing is lost.
-constexpr float choice_share_min = 1e-3f;
-// A group that fills less than this share of the hemisphere from a cell is left to them too.
-constexpr float coverage_min = 1e-5f;
+// The faintest emitters of a group in a cell, which have this share of its light there together, are left to the gather
+// rays: they still find them, with full weight, so nothing is lost, but seldom.
+constexpr float left_share_max = 0.01f;
+// So is a group where it has less than this share of its mean light in the cells that it shines into.
+constexpr float cell_share_min = 1e-3f;
 // Every emitter sends out some of its group's rays, up to so many in all.
 constexpr uint32_t rays_per_emitter = 128, probe_rays_max = 65536;
 constexpr float lift_m = 1e-3f;  // off the emitter
@@ -28,6 +28,19 @@ glm::vec2 onTriangle(glm::vec2 u) {
 }
 glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
+}
+
+// Takes those of the least weight out, from `first` on, that have `left_max` together at most. Keeps the order.
+void leaveFaintest(auto& choices, size_t first, float left_max) {
+    std::vector<float> weights;
+    for (size_t i = first; i < choices.size(); ++i) weights.push_back(choices[i].probability);
+    std::ranges::sort(weights);
+    float left = 0;
+    size_t count = 0;
+    while (count + 1 < weights.size() && left + weights[count] <= left_max) left += weights[count++];
+    const auto tail = std::remove_if(choices.begin() + static_cast<long>(first), choices.end(),
+                                     [&](const auto& c) { return c.probability < weights[count]; });
+    choices.erase(tail, choices.end());
 }
 
 }  // namespace
@@ -71,13 +84,27 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     std::vector<std::vector<uint8_t>> lit(groups.size());
     tbb::parallel_for(size_t{0}, groups.size(), [&](size_t g) { lit[g] = litCells(rays, groups[g]); });
     tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(i, lit); });
-    first_range_.push_back(0);
-    for (Cell& cell : cells_) {
-        for (GroupRange r : cell.ranges) {
-            r.first += static_cast<uint32_t>(choices_.size());
-            ranges_.push_back(r);
+    gatherCells();
+}
+
+// All cells' ranges and choices in one array each, without the groups that are faint there.
+void EmitterSampler::gatherCells() {
+    std::vector<double> light(identities_.size()), cells(identities_.size());
+    for (const Cell& cell : cells_)
+        for (size_t r = 0; r < cell.ranges.size(); ++r) {
+            light[cell.ranges[r].group] += static_cast<double>(cell.light[r]);
+            ++cells[cell.ranges[r].group];
         }
-        choices_.insert(choices_.end(), cell.choices.begin(), cell.choices.end());
+    first_range_.push_back(0);
+    for (const Cell& cell : cells_) {
+        for (size_t r = 0; r < cell.ranges.size(); ++r) {
+            GroupRange range = cell.ranges[r];
+            if (static_cast<double>(cell.light[r] / cell_share_min) * cells[range.group] < light[range.group]) continue;
+            const auto choices = std::span(cell.choices).subspan(range.first, range.count);
+            range.first = static_cast<uint32_t>(choices_.size());
+            choices_.insert(choices_.end(), choices.begin(), choices.end());
+            ranges_.push_back(range);
+        }
         first_range_.push_back(static_cast<uint32_t>(ranges_.size()));
     }
     cells_ = {};
@@ -116,7 +143,7 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
     for (size_t begin = 0, g = 0; begin < emitters_.size(); ++g) {
         const uint32_t group = emitters_[begin].group;
         const size_t first = cell.choices.size();
-        float sum = 0, brightest = 0;
+        float sum = 0;
         size_t end = begin;
         while (end < emitters_.size() && emitters_[end].group == group) ++end;
         const size_t range_begin = std::exchange(begin, end);
@@ -124,7 +151,6 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
         for (size_t i = range_begin; i < end; ++i) {
             const Emitter& e = emitters_[i];
             const glm::vec3 to_centre = centre - (e.corner + (e.edge1 + e.edge2) / 3.0f);
-            brightest = std::max(brightest, luminance(e.radiance_cd_m2));
             if (!e.double_sided && glm::dot(centre - e.corner, e.normal) < -radius_m) continue;
             const float near2 = radius_m * radius_m + e.area_m2;
             const float weight =
@@ -132,14 +158,12 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
             cell.choices.push_back({static_cast<uint32_t>(i), weight, 0});
             sum += weight;
         }
-        auto keep = [&](const Choice& c) { return c.probability >= choice_share_min * sum; };
-        const auto tail =
-            std::stable_partition(cell.choices.begin() + static_cast<long>(first), cell.choices.end(), keep);
-        cell.choices.erase(tail, cell.choices.end());
-        if (!(sum > coverage_min * pi * brightest) || cell.choices.size() == first) {
+        if (!(sum > 0)) {
             cell.choices.resize(first);
             continue;
         }
+        leaveFaintest(cell.choices, first, left_share_max * sum);
+        cell.light.push_back(sum);
         float kept = 0, cumulative = 0;
         for (size_t i = first; i < cell.choices.size(); ++i) kept += cell.choices[i].probability;
         for (size_t i = first; i < cell.choices.size(); ++i) {

@@ -73,10 +73,12 @@ class EmitterSampler {
     struct Cell {
         std::vector<GroupRange> ranges;
         std::vector<Choice> choices;
+        std::vector<float> light;  // per range: radiance times solid angle, about
     };
     std::vector<uint8_t> litCells(const RayScene& rays, std::span<const Emitter> of_group) const;
     // `lit`: per range of emitters of one group, in order, the cells that it shines into.
     void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);
+    void gatherCells();
 
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;

@@ -145,7 +145,8 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
             if (s.done) continue;
             s.add(round_[t]);
             const float interval = normal_95 * std::sqrt(s.varianceOfMean());
-            s.done = r + 1 >= rounds_min && options.noise_max > 0 &&
+            // A term that is active here and that no ray has found yet may come from a small bright place.
+            s.done = r + 1 >= rounds_min && options.noise_max > 0 && s.mean > 0 &&
                      interval <= options.noise_max * (s.mean + options.floor_lux[t]);
             const bool aimed = aim_of_term_[t] != 0, look = r + 1 >= rounds_min && std::has_single_bit(r + 1);
             if (aimed && (s.done || (look && !aimPays(t)))) leaveAim(t);

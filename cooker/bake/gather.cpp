@@ -421,6 +421,8 @@ template <class Light>
 void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const {
     const auto samples = static_cast<float>(options.emitter_samples);
     const uint32_t any_point = hash(options.seed, from.id);
+    // Each of the receiver's points gets each part of the group's emitters, in turns: they may be shadowed differently.
+    const uint32_t turn = options.first_ray / std::max(options.rays, 1u);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;
         const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
@@ -428,7 +430,8 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;
             // Seeded by the group alone, not by its place in a list: other sets do not change its noise.
             const uint32_t seed = hash(hash(options.seed ^ 0x5bd1e995u, from.id), range.identity);
-            const float choice = (static_cast<float>(i) + unitFloat(hash(seed, index))) / samples;
+            const uint32_t stratum = (i + turn) % options.emitter_samples;
+            const float choice = (static_cast<float>(stratum) + unitFloat(hash(seed, index))) / samples;
             const EmitterSample s = emitters_.sample(range, origin.position_m, choice, sequence2d(index, seed));
             const glm::vec3 d = toTangent(origin, s.direction);
             if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;

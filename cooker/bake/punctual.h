@@ -2,7 +2,10 @@
 #pragma once
 
 #include <scene/scene.h>
+#include <trace/ray_scene.h>
 
+#include <algorithm>
+#include <cmath>
 #include <glm/glm.hpp>
 
 namespace dimmer::cook {
@@ -12,6 +15,12 @@ struct Illumination {
     float distance_m = 0;         // infinite for a directional light
     glm::vec3 irradiance_lux{0};  // on a surface that faces the light, nothing between
 };
+
+// How far a shadow ray goes: to a little before a lamp, as one that lies in a surface, a ceiling's say, shines from it.
+inline float shadowRayLengthM(const Illumination& lit) {
+    constexpr float lift_m = 5e-4f;
+    return std::isinf(lit.distance_m) ? far_away_m : std::max(0.0f, lit.distance_m - lift_m);
+}
 
 // What `light` does at `point`. Inverse square with a least distance of 1 cm, windowed by the range; spots by the glTF
 // cone formula (KHR_lights_punctual); measured luminaires by their profile (EXT_lights_ies).

@@ -164,7 +164,7 @@ glm::vec3 ReferenceTracer::fromLight(const Light& light, const Vertex& vertex) c
     const Illumination lit = illuminate(rays_.scene().lights[light.index], vertex.point);
     const float cos_surface = vertex.cosine(lit.towards_light);
     if (!(cos_surface > 0) || lit.irradiance_lux == glm::vec3(0)) return glm::vec3(0);
-    const float distance = std::isinf(lit.distance_m) ? far_away_m : lit.distance_m;
+    const float distance = shadowRayLengthM(lit);
     return light.weight * lit.irradiance_lux *
            (cos_surface * rays_.transmittance(vertex.point, lit.towards_light, distance));
 }

@@ -1,9 +1,10 @@
 #include <bake/series.h>
 
+#include <bake/activity.h>
 #include <bake/direct.h>
-#include <bake/door_surroundings.h>
 #include <bake/links.h>
 #include <bake/sampling.h>
+#include <bake/sums.h>
 
 #include <atomic>
 #include <bit>
@@ -19,17 +20,9 @@ namespace {
 // 1 %, 0.01 % of the set's mean. What that loses over a series is far below the threshold's own loss. Larger thresholds
 // let no more go: the series, and so what is cached of it, is the same for all of them.
 constexpr float lingering_share = 0.01f;
-// Texels to each side that tell whether light is active at one.
-constexpr int activity_reach = 2;
-constexpr float around_texel_sizes = 4;  // from corner to corner of so many texels, wherever in them samples lie
 constexpr float lingering_threshold_max = 0.01f;
 // Terms with doors are many, and their thresholds a few thousandths of the light around the door.
 constexpr float door_lingering_share = 0.1f;
-
-// A term with doors ends at the threshold's share of so many times the mean of what its group changes around the door.
-// What lies below is then about as little of the change as what other terms lose is of their light: the mean counts
-// many receivers that the door hardly changes, theirs only such as are lit straight.
-constexpr float door_change_factor = 3;
 
 // Few rays find their way through a door, and what they find there is spread over the whole room by the bounces that
 // follow, where no later ray mends it. So many times as many look for doors alone.
@@ -38,6 +31,8 @@ constexpr uint32_t door_rays_per_ray = 1;
 // After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
 // shrink evenly yet, later there is less to gain.
 constexpr uint32_t rounds_before_leap = 6;
+// Places where a group has less than this share of its mean light count for less: what is still to come there is faint.
+constexpr float dim_share = 1e-2f;
 // Links are random, and each costs a trip to memory: asked for so many links ahead.
 constexpr size_t links_ahead = 8;
 
@@ -53,6 +48,7 @@ class Expansion {
           paths_(gatherer.paths()),
           terms_(paths_.termCount()),
           ends_(ends),
+          activity_(gatherer, settings, doors_seen_),
           running_(groups.begin(), groups.end()) {
         if (running_.empty()) running_.assign(paths_.groupCount(), 1);
         followed_in_group_.resize(paths_.groupCount());
@@ -63,7 +59,7 @@ class Expansion {
         directPass(UINT32_MAX);
         bounce();
         out_.radiance = outgoing(out_.bounced, true);
-        decideActivity();
+        activity_.decide(out_);
         out_.rays = rays_traced_;
         out_.doors_seen = std::move(doors_seen_);
         return std::move(out_);
@@ -72,11 +68,7 @@ class Expansion {
     std::vector<double> flux() {
         directPass(1);
         bounce();
-        std::vector<double> sums(terms_);
-        forEachPair([&](size_t i, uint32_t t, float, float, float stored) {
-            sums[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
-        });
-        return sums;
+        return activity_.flux(out_);
     }
 
    private:
@@ -250,26 +242,47 @@ class Expansion {
         }
     }
 
-    // Of one light group, lm.
+    // Of one light group, over places that count alike: what lies in a dim room as well as what the sun lights.
     struct Flux {
-        double sum = 0, step = 0;  // bounced so far; what the last round changed, either way
-        double ratio = 1;          // of the last two steps
+        double sum = 0,
+               step = 0;   // bounced so far; what the last round changed, either way; shares of what is there, m2
+        double ratio = 1;  // of the last two steps
         double ratio_at_leap = 0;
     };
 
     void measure(const SparseLight& before, std::vector<Flux>& groups) const {
-        std::vector<Flux> now(groups.size());
-        forEachStep(before, out_.bounced, 0, receivers_, [&](size_t i, const TermLight& l, glm::vec3 old) {
-            Flux& group = now[paths_.terms()[l.term].group];
-            const float area_m2 = gatherer_.areaM2(i);
-            group.sum += static_cast<double>(area_m2 * luminance(l.value));
-            group.step += static_cast<double>(area_m2 * std::abs(luminance(l.value - old)));
+        // Of each group the area that has light, then the light, and later the step.
+        const size_t count = groups.size();
+        const Sums all = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
+            for (size_t i = begin; i < end; ++i)
+                for (const TermLight& l : out_.bounced.row(i)) {
+                    sum.of[2 * paths_.group(l.term)] += static_cast<double>(gatherer_.areaM2(i));
+                    sum.of[2 * paths_.group(l.term) + 1] +=
+                        static_cast<double>(gatherer_.areaM2(i) * luminance(l.value));
+                }
         });
-        for (size_t g = 0; g < groups.size(); ++g) {
+        std::vector<float> floor_lux;
+        for (size_t g = 0; g < count; ++g)
+            floor_lux.push_back(dim_share * static_cast<float>(all.of[2 * g + 1] / std::max(all.of[2 * g], 1e-30)));
+        const Sums now = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
+            std::vector<float> there(count);  // of each group
+            for (size_t i = begin; i < end; ++i) {
+                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value);
+                forEachStep(before, out_.bounced, i, i + 1, [&](size_t, const TermLight& l, glm::vec3 old) {
+                    const size_t group = paths_.group(l.term);
+                    const float share = gatherer_.areaM2(i) / std::max(there[group] + floor_lux[group], 1e-30f);
+                    sum.of[2 * group] += static_cast<double>(share * luminance(l.value));
+                    sum.of[2 * group + 1] += static_cast<double>(share * std::abs(luminance(l.value - old)));
+                });
+                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] = 0;
+            }
+        });
+        for (size_t g = 0; g < count; ++g) {
             if (!running_[g]) continue;
-            groups[g].ratio = groups[g].step > 0 ? now[g].step / groups[g].step : 1;
-            groups[g].sum = now[g].sum;
-            groups[g].step = now[g].step;
+            const double step = now.of[2 * g + 1];
+            groups[g].ratio = groups[g].step > 0 ? step / groups[g].step : 1;
+            groups[g].sum = now.of[2 * g];
+            groups[g].step = step;
         }
     }
 
@@ -332,134 +345,10 @@ class Expansion {
     void decideLeast(uint32_t round) {
         const bool first = least_.empty();
         if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(round + 1))) return;
-        const std::vector<TermReport> reports = thresholds(lingering_threshold_max);
+        const std::vector<TermReport> reports = activity_.thresholds(out_, lingering_threshold_max);
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
             least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
-    }
-
-    // `most`: no threshold is taken to be larger.
-    std::vector<TermReport> thresholds(float most) const {
-        std::vector<TermReport> reports(terms_);
-        std::vector<double> sums(terms_);
-        DoorSurroundings around(paths_, doors_seen_);
-        forEachPair([&](size_t i, uint32_t t, float direct, float bounced, float stored) {
-            around.add(i, t, stored);
-            const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
-            if (!counts) return;
-            ++reports[t].measured_over;
-            sums[t] += static_cast<double>(t < paths_.groupCount() ? bounced : stored);
-        });
-        for (uint32_t t = 0; t < terms_; ++t) {
-            TermReport& report = reports[t];
-            if (report.measured_over > 0)
-                report.mean_lux = static_cast<float>(sums[t] / static_cast<double>(report.measured_over));
-            if (t == always_group) continue;
-            const Term& term = paths_.terms()[t];
-            const float base = term.free() ? report.mean_lux : doorBase(term, reports[term.group].mean_lux, around);
-            report.threshold_lux = std::min(settings_.thresholdOf(term.group), most) * base;
-        }
-        return reports;
-    }
-
-    // Beside the group's other light a door's may be faint, and yet all that there is behind the door.
-    float doorBase(const Term& term, float group_mean_lux, const DoorSurroundings& around) const {
-        const float of_others = std::max(group_mean_lux, around.light(term));
-        return std::clamp(door_change_factor * around.changed(term), settings_.door_share * of_others, of_others);
-    }
-
-    bool seesDoorOf(size_t receiver, uint32_t term) const {
-        return std::ranges::any_of(doors_seen_.row(receiver),
-                                   [&](uint32_t door) { return paths_.terms()[term].isAbout(door); });
-    }
-
-    // By bounced light over neighbouring texels: by its own few rays a receiver that saw little would be cut and its
-    // neighbour that saw much be kept, which leaves faint light too dark and terms' regions ragged.
-    void decideActivity() {
-        out_.reports = thresholds(1);
-        for (uint32_t t = 0; t < terms_; ++t) {
-            const float share = settings_.thresholdOf(paths_.terms()[t].group);
-            out_.threshold_base.push_back(share > 0 ? out_.reports[t].threshold_lux / share : 0.0f);
-        }
-        SparseLight active = activeAround(out_.bounced);
-        std::vector<double> dropped(terms_);
-        forEachPair([&](size_t i, uint32_t t, float direct, float, float stored) {
-            const double energy = static_cast<double>(gatherer_.areaM2(i) * stored);
-            out_.reports[t].energy += energy;
-            const auto row = active.row(i);
-            bool kept = out_.active(t, direct, 0);
-            for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
-                kept = std::ranges::find(row, into, &TermLight::term) != row.end();
-            if (!kept) dropped[t] += energy;
-        });
-        for (uint32_t t = 0; t < terms_; ++t)
-            if (out_.reports[t].energy > 0) out_.reports[t].energy_dropped = dropped[t] / out_.reports[t].energy;
-        out_.bounced = std::move(active);
-    }
-
-    // The mean of what the texels around in the same chart have (models' receivers: their own), where it is active.
-    SparseLight activeAround(const SparseLight& bounced) const {
-        const size_t texels = gatherer_.texels().size();
-        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
-            TermAccumulator<glm::vec3> sum(terms_);
-            std::vector<TermLight> row;
-            for (size_t i = begin; i < end; ++i) {
-                float count = 0;
-                const auto add = [&](size_t receiver) {
-                    ++count;
-                    for (const TermLight& l : bounced.row(receiver)) sum[l.term] += l.value;
-                };
-                if (i < texels)
-                    forEachAround(i, add);
-                else
-                    add(i);
-                takeRow(sum, row);
-                for (TermLight& l : row) l.value /= count;
-                std::erase_if(row, [&](const TermLight& l) { return !out_.active(l.term, 0, luminance(l.value)); });
-                emit(std::span<const TermLight>(row));
-            }
-        });
-    }
-
-    // Charts that came with the level may hold islands that only the page has side by side.
-    bool nearInSpace(size_t a, size_t b) const {
-        const Texels& texels = gatherer_.texels();
-        const float size_m = std::sqrt(std::max(texels.area_m2[a], texels.area_m2[b]));
-        return glm::distance(texels.sample(a, 0).position_m, texels.sample(b, 0).position_m) <=
-               around_texel_sizes * size_m;
-    }
-
-    void forEachAround(size_t texel, auto&& visit) const {
-        for (int dy = -activity_reach; dy <= activity_reach; ++dy)
-            for (int dx = -activity_reach; dx <= activity_reach; ++dx) {
-                const uint32_t other = neighbourInChart(gatherer_.unwrap(), gatherer_.texels(), texel, dx, dy);
-                if (other != no_index && nearInSpace(texel, other)) visit(other);
-            }
-    }
-
-    // visit(receiver, term, direct, bounced, storable), luminances in lux, for every pair that has light. Storable is
-    // all of it but the direct light of lamps that a renderer draws itself.
-    void forEachPair(auto&& visit) const {
-        std::vector<float> direct(terms_), bounced(terms_), left_out(terms_);
-        std::vector<uint32_t> here;
-        for (size_t i = 0; i < receivers_; ++i) {
-            here.clear();
-            for (const TermLight& l : out_.direct.row(i)) {
-                direct[l.term] = luminance(l.value);
-                here.push_back(l.term);
-            }
-            for (const TermLight& l : out_.bounced.row(i)) {
-                bounced[l.term] = luminance(l.value);
-                here.push_back(l.term);
-            }
-            for (const TermLight& l : out_.left_to_renderer.row(i)) left_out[l.term] = luminance(l.value);
-            std::ranges::sort(here);
-            here.erase(std::unique(here.begin(), here.end()), here.end());
-            for (uint32_t t : here) {
-                visit(i, t, direct[t], bounced[t], std::max(0.0f, direct[t] - left_out[t]) + bounced[t]);
-                direct[t] = bounced[t] = left_out[t] = 0;
-            }
-        }
     }
 
     const Gatherer& gatherer_;
@@ -469,7 +358,8 @@ class Expansion {
     LightGrid grid_;
     const DoorPaths& paths_;
     uint32_t terms_;
-    RayEnds* ends_;                            // may be null
+    RayEnds* ends_;  // may be null
+    Activity activity_;
     std::vector<uint8_t> running_;             // per light group: its light is still followed
     std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
     Links links_;                              // series_rays of each receiver
@@ -481,31 +371,6 @@ class Expansion {
 };
 
 }  // namespace
-
-bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux) {
-    const float threshold = report.threshold_lux;
-    return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
-           (bounced_lux > 0 && bounced_lux >= threshold);
-}
-
-float Series::keepUpTo(size_t receiver, uint32_t term) const {
-    float brightest = 0;
-    for (const auto* part : {&direct, &bounced})
-        for (const TermLight& l : part->row(receiver))
-            if (l.term == term) brightest = std::max(brightest, luminance(l.value));
-    const float base = term == always_group ? 0 : threshold_base[term];
-    return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
-}
-
-void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
-    terms.assign(1, always_group);
-    for (const TermLight& l : direct.row(receiver))
-        if (l.term != always_group && active(l.term, luminance(l.value), 0)) terms.push_back(l.term);
-    for (const TermLight& l : bounced.row(receiver))
-        if (l.term != always_group && active(l.term, 0, luminance(l.value))) terms.push_back(l.term);
-    std::ranges::sort(terms);
-    terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
-}
 
 Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups, RayEnds* links) {

@@ -155,7 +155,8 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
                     "places per probe of the global grid at which light is traced, to choose and fit probes by"});
     list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});
     list.push_back({prefix + "tolerance", &q.tolerance, 1e-6, 1,
-                    "bounces end when what is still to come is below this share (0..1) of a set's light"});
+                    "bounces end when what is still to come is below this share (0..1) of a set's light, in the mean "
+                    "over the places that it lights: bright or dim, they count alike"});
     list.push_back(
         {prefix + "zstd_level", &q.zstd_level, 1, 19,
          "compression of the pack: 16 packs a tenth smaller than 7 in three times the time; reading is as fast"});

@@ -91,5 +91,25 @@ TEST(Punctual, AMeasuredLuminaireLightsAFloorThroughTheBaker) {
     }
 }
 
+// At the very height of the ceiling, as the nodes of recessed lamps often are: rounding decides nothing. I h / d^3.
+TEST(Punctual, ALampInThePlaneOfACeilingShinesFromIt) {
+    Scene scene;
+    addBox(scene, {1, 0.7f, 1}, addMaterial(scene, lambert(0)));
+    addPointLight(scene, {0.3f, 0.7f, 0.2f}, 100, BakeMode::Full);
+    BakedScene b(scene);
+    b.bake({.final_rays = 64});
+    int count = 0;
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        if (b.normal(i).y < 0.5f) continue;
+        const double expected = b.mean(i, [](glm::dvec3 p) {
+            const double d = glm::length(glm::dvec3(0.3, 0.7, 0.2) - p);
+            return 100 * (0.7 - p.y) / (d * d * d);
+        });
+        EXPECT_NEAR(static_cast<double>(b.lux(i).y) / expected, 1, 1e-5);
+        ++count;
+    }
+    EXPECT_EQ(count, 64);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -1,0 +1,205 @@
+#include <bake/activity.h>
+
+#include <bake/sums.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace dimmer::cook {
+namespace {
+
+// Texels to each side that tell whether light is active at one.
+constexpr int activity_reach = 2;
+constexpr float around_texel_sizes = 4;  // from corner to corner of so many texels, wherever in them samples lie
+
+// A term with doors ends at the threshold's share of so many times the mean of what its group changes around the door.
+// What lies below is then about as little of the change as what other terms lose is of their light: the mean counts
+// many receivers that the door hardly changes, theirs only such as are lit straight.
+constexpr float door_change_factor = 3;
+
+}  // namespace
+
+// Per term the luminances, lux, of the receivers that its mean is taken over, and how many these are; and what groups
+// send around doors.
+struct Activity::Around {
+    Sums lux, receivers;
+    DoorSurroundings doors;
+    Around& operator+=(const Around& o) {
+        lux += o.lux;
+        receivers += o.receivers;
+        doors += o.doors;
+        return *this;
+    }
+};
+
+std::vector<TermReport> Activity::thresholds(const Series& light, float most) const {
+    const size_t terms = paths_.termCount();
+    const Sums zeros(terms);
+    const Around around = sumOverRows(
+        gatherer_.receiverCount(), Around{zeros, zeros, DoorSurroundings(paths_, doors_seen_)},
+        [&](size_t begin, size_t end, Around& sum) {
+            for (size_t i = begin; i < end; ++i) sum.doors.addReceiver(i);
+            forEachPair(light, begin, end, [&](size_t i, uint32_t t, float direct, float bounced, float stored) {
+                sum.doors.add(i, t, stored);
+                const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
+                if (!counts) return;
+                ++sum.receivers.of[t];
+                sum.lux.of[t] += static_cast<double>(t < paths_.groupCount() ? bounced : stored);
+            });
+        });
+    std::vector<TermReport> reports(terms);
+    for (uint32_t t = 0; t < terms; ++t) {
+        TermReport& report = reports[t];
+        report.measured_over = static_cast<uint64_t>(around.receivers.of[t]);
+        if (report.measured_over > 0) report.mean_lux = static_cast<float>(around.lux.of[t] / around.receivers.of[t]);
+        if (t == always_group) continue;
+        const Term& term = paths_.terms()[t];
+        const float base = term.free() ? report.mean_lux : doorBase(term, reports[term.group].mean_lux, around.doors);
+        report.threshold_lux = std::min(settings_.thresholdOf(term.group), most) * base;
+    }
+    return reports;
+}
+
+std::vector<double> Activity::flux(const Series& light) const {
+    return sumOverRows(gatherer_.receiverCount(), Sums(paths_.termCount()),
+                       [&](size_t begin, size_t end, Sums& sum) {
+                           forEachPair(light, begin, end, [&](size_t i, uint32_t t, float, float, float stored) {
+                               sum.of[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
+                           });
+                       })
+        .of;
+}
+
+// Beside the group's other light a door's may be faint, and yet all that there is behind the door.
+float Activity::doorBase(const Term& term, float group_mean_lux, const DoorSurroundings& around) const {
+    const float of_others = std::max(group_mean_lux, around.light(term));
+    return std::clamp(door_change_factor * around.changed(term), settings_.door_share * of_others, of_others);
+}
+
+bool Activity::seesDoorOf(size_t receiver, uint32_t term) const {
+    return std::ranges::any_of(doors_seen_.row(receiver),
+                               [&](uint32_t door) { return paths_.terms()[term].isAbout(door); });
+}
+
+// By bounced light over neighbouring texels: by its own few rays a receiver that saw little would be cut and its
+// neighbour that saw much be kept, which leaves faint light too dark and terms' regions ragged.
+void Activity::decide(Series& series) const {
+    const size_t terms = paths_.termCount();
+    series.reports = thresholds(series, 1);
+    series.threshold_base.clear();
+    for (uint32_t t = 0; t < terms; ++t) {
+        const float share = settings_.thresholdOf(paths_.terms()[t].group);
+        series.threshold_base.push_back(share > 0 ? series.reports[t].threshold_lux / share : 0.0f);
+    }
+    SparseLight active = activeAround(series);
+    const std::vector<double> energy = flux(series);
+    const std::vector<double> dropped =
+        sumOverRows(gatherer_.receiverCount(), Sums(terms), [&](size_t begin, size_t end, Sums& sum) {
+            forEachPair(series, begin, end, [&](size_t i, uint32_t t, float direct, float, float stored) {
+                const auto row = active.row(i);
+                bool kept = series.active(t, direct, 0);
+                for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
+                    kept = std::ranges::find(row, into, &TermLight::term) != row.end();
+                if (!kept) sum.of[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
+            });
+        }).of;
+    for (uint32_t t = 0; t < terms; ++t) {
+        series.reports[t].energy = energy[t];
+        if (energy[t] > 0) series.reports[t].energy_dropped = dropped[t] / energy[t];
+    }
+    series.bounced = std::move(active);
+}
+
+// The mean of what the texels around in the same chart have (models' receivers: their own), where it is active.
+SparseLight Activity::activeAround(const Series& series) const {
+    const size_t texels = gatherer_.texels().size();
+    return SparseLight::build(gatherer_.receiverCount(), [&](size_t begin, size_t end, auto emit) {
+        TermAccumulator<glm::vec3> sum(paths_.termCount());
+        std::vector<TermLight> row;
+        for (size_t i = begin; i < end; ++i) {
+            float count = 0;
+            const auto add = [&](size_t receiver) {
+                ++count;
+                for (const TermLight& l : series.bounced.row(receiver)) sum[l.term] += l.value;
+            };
+            if (i < texels)
+                forEachAround(i, add);
+            else
+                add(i);
+            row.clear();
+            for (const uint32_t t : sum.touched())
+                if (const glm::vec3 mean = sum[t] / count; series.active(t, 0, luminance(mean)))
+                    row.push_back({t, mean});
+            sum.clear();
+            emit(std::span<const TermLight>(row));
+        }
+    });
+}
+
+// Charts that came with the level may hold islands that only the page has side by side.
+bool Activity::nearInSpace(size_t a, size_t b) const {
+    const Texels& texels = gatherer_.texels();
+    const float size_m = std::sqrt(std::max(texels.area_m2[a], texels.area_m2[b]));
+    return glm::distance(texels.sample(a, 0).position_m, texels.sample(b, 0).position_m) <= around_texel_sizes * size_m;
+}
+
+void Activity::forEachAround(size_t texel, auto&& visit) const {
+    for (int dy = -activity_reach; dy <= activity_reach; ++dy)
+        for (int dx = -activity_reach; dx <= activity_reach; ++dx) {
+            const uint32_t other = neighbourInChart(gatherer_.unwrap(), gatherer_.texels(), texel, dx, dy);
+            if (other != no_index && nearInSpace(texel, other)) visit(other);
+        }
+}
+
+// visit(receiver, term, direct, bounced, storable), luminances in lux, for every pair that has light. Storable is all
+// of it but the direct light of lamps that a renderer draws itself.
+void Activity::forEachPair(const Series& light, size_t begin, size_t end, auto&& visit) const {
+    std::vector<float> direct(paths_.termCount()), bounced(direct), left_out(direct);
+    std::vector<uint32_t> here;
+    for (size_t i = begin; i < end; ++i) {
+        here.clear();
+        for (const TermLight& l : light.direct.row(i)) {
+            direct[l.term] = luminance(l.value);
+            here.push_back(l.term);
+        }
+        for (const TermLight& l : light.bounced.row(i)) {
+            bounced[l.term] = luminance(l.value);
+            here.push_back(l.term);
+        }
+        for (const TermLight& l : light.left_to_renderer.row(i)) left_out[l.term] = luminance(l.value);
+        std::ranges::sort(here);
+        here.erase(std::unique(here.begin(), here.end()), here.end());
+        for (const uint32_t t : here) {
+            visit(i, t, direct[t], bounced[t], std::max(0.0f, direct[t] - left_out[t]) + bounced[t]);
+            direct[t] = bounced[t] = left_out[t] = 0;
+        }
+    }
+}
+
+bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux) {
+    const float threshold = report.threshold_lux;
+    return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
+           (bounced_lux > 0 && bounced_lux >= threshold);
+}
+
+float Series::keepUpTo(size_t receiver, uint32_t term) const {
+    float brightest = 0;
+    for (const auto* part : {&direct, &bounced})
+        for (const TermLight& l : part->row(receiver))
+            if (l.term == term) brightest = std::max(brightest, luminance(l.value));
+    const float base = term == always_group ? 0 : threshold_base[term];
+    return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
+}
+
+void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
+    terms.assign(1, always_group);
+    for (const TermLight& l : direct.row(receiver))
+        if (l.term != always_group && active(l.term, luminance(l.value), 0)) terms.push_back(l.term);
+    for (const TermLight& l : bounced.row(receiver))
+        if (l.term != always_group && active(l.term, 0, luminance(l.value))) terms.push_back(l.term);
+    std::ranges::sort(terms);
+    terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
+}
+
+}  // namespace dimmer::cook
