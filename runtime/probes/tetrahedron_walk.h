@@ -1,5 +1,5 @@
-// From a point to the probes of the global grid that light it. Every number is a 32-bit float and every operation +, -,
-// * or /, in the order written, so that a shader can give the same bits.
+// From a point to the probes of the global grid that light it. Every number is a 32-bit float and every operation +, -
+// or *, in the order written, so that a shader can give the same bits.
 #pragma once
 
 #include <pack/grid_data.h>

@@ -1,5 +1,6 @@
-// The CPU executor: the twin of the Vulkan runtime, bit for bit on devices with IEEE arithmetic. For tests, tools and
-// servers without a GPU.
+// The CPU executor: the twin of the Vulkan runtime, bit for bit on every device whose 32-bit +, - and * round to
+// nearest, as IEEE's do: blends use nothing else (Vulkan demands correct rounding of these, and leaves the direction
+// open). For tests, tools and servers without a GPU.
 #pragma once
 
 #include <dimmer/light_state.h>

@@ -162,7 +162,9 @@ typedef struct dimmer_lights dimmer_lights;
  * models that move (28 bytes each). Keeps what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
-/* Null is allowed. Waits for what dimmer_lights_submit() sent; what was recorded must have completed. */
+/* Null is allowed. Waits for what dimmer_lights_submit() sent, and for nothing else: of the caller's submissions those
+ * must have completed that have a recorded update in them, read images, probes or the grid's tables, or wait for the
+ * lights' semaphore. */
 void dimmer_lights_destroy(dimmer_lights* lights);
 
 /* Changes cost nanoseconds and take effect with the next update. At the start every light set is at 1 (or its maximum,
@@ -216,8 +218,8 @@ typedef struct dimmer_model {
 } dimmer_model;
 
 /* The next update takes the model's probes from the level's global grid, and again whenever it moved or the light
- * around it changed. `world_from_model`: as of dimmer_placed_model. DIMMER_OUT_OF_MEMORY where moving_probes_max is
- * reached. */
+ * around it changed. `world_from_model`: as of dimmer_placed_model. DIMMER_UNSUPPORTED where the pack has no global
+ * grid, DIMMER_OUT_OF_MEMORY where moving_probes_max is reached. */
 dimmer_result dimmer_lights_add_model(dimmer_lights* lights, const dimmer_model_grid* grid,
                                       const float world_from_model[12], dimmer_model* model);
 dimmer_result dimmer_lights_move_model(dimmer_lights* lights, dimmer_model model, const float world_from_model[12]);
@@ -244,22 +246,26 @@ dimmer_result dimmer_sample_model(const dimmer_pack* pack, const uint32_t* probe
 
 #ifndef DIMMER_NO_VULKAN
 
-/* The caller's device: Vulkan 1.2 with timelineSemaphore, and a queue with compute. It must outlive the lights. */
+/* The caller's device: Vulkan 1.2, of the instance too, with timelineSemaphore, and a queue with compute. It must
+ * outlive the lights. */
 typedef struct dimmer_vulkan {
     VkInstance instance;
     VkPhysicalDevice physical_device;
     VkDevice device;
     VkQueue queue;
-    uint32_t queue_family;
+    uint32_t queue_family; /* the queue's, and that of the command buffers given to dimmer_lights_record() */
     VkQueue compute_queue; /* optional: where dimmer_lights_submit() runs; VK_NULL_HANDLE: on `queue` */
     uint32_t compute_queue_family;
 } dimmer_vulkan;
 
 typedef enum dimmer_buffering {
-    DIMMER_IN_PLACE = 0,       /* updates write the pages that frames sample, between barriers of their own */
-    DIMMER_DOUBLE_BUFFERED = 1 /* two sets of pages that take turns; twice the memory for pages */
+    DIMMER_IN_PLACE = 0,       /* updates write the pages and probes that frames read, between barriers of their own */
+    DIMMER_DOUBLE_BUFFERED = 1 /* two sets of pages and of probes that take turns; twice the memory for both */
 } dimmer_buffering;
 
+/* DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue may be), a queue family that the device does not have, or
+ * one without compute. DIMMER_UNSUPPORTED: a device below Vulkan 1.2, or one without a format or limit that the pack
+ * needs. */
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
                                           dimmer_buffering buffering, uint32_t moving_probes_max,
                                           dimmer_lights** lights);
@@ -267,27 +273,36 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
 /* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
 
 /* Records the update into the caller's command buffer, outside a render pass, with the barriers that let fragment and
- * compute shaders sample afterwards. Nothing changed: nothing is recorded (0 dispatches). A call that records
- * overwrites what the last recording's commands read: their submission must have completed, and the fence of two frames
- * ago does not say that. With several frames in flight, use dimmer_lights_submit(). */
+ * compute shaders sample afterwards. The command buffer must be of `queue_family`, and be submitted to `queue`, once.
+ * Its compute pipeline, compute descriptor sets and push constants are others afterwards. Nothing changed: nothing is
+ * recorded (0 dispatches). With work, it first blocks until what dimmer_lights_submit() sent is done. A call that
+ * records overwrites what the last recording's commands read: their submission must have completed, and the fence of
+ * two frames ago does not say that. With several frames in flight, use dimmer_lights_submit(). */
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
-/* What was recorded last will never run (a frame was given up): the next update does its work. */
+/* What the last call that found work recorded will never run (a frame was given up): the next update does its work.
+ * Calls that found nothing to do may have come since. Where dimmer_lights_submit() found work since, or it was taken
+ * back already, nothing happens. Of several recordings only the last can be taken back. */
 dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights);
 
 /* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. A later call
- * waits for the earlier one's update, but not for what was recorded. */
+ * with work blocks until the earlier one's update is done, but does not wait for what was recorded, which must have
+ * completed. */
 dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats);
 /* The same, once `semaphore` (null: nothing) has `value`: with a queue of its own an update must wait for the frames
- * that sample what it writes. Timeline semaphores only: where nothing changed, nothing is submitted and nothing waits,
- * and a binary semaphore would stay signalled. */
+ * that read what it writes, pages or probes: in place what dimmer_lights_get_images() and
+ * dimmer_lights_get_probe_buffers() name, with DIMMER_DOUBLE_BUFFERED the other sets than those that they name before
+ * the call. Timeline semaphores only: where nothing changed, nothing is submitted and nothing waits, and a binary
+ * semaphore would stay signalled. A value that nobody ever signals blocks dimmer_lights_wait(), the next update with
+ * work and dimmer_lights_destroy() for ever. */
 dimmer_result dimmer_lights_submit_after(dimmer_lights* lights, VkSemaphore semaphore, uint64_t value,
                                          dimmer_update_stats* stats);
 /* Blocks until what was submitted is done, and gives the last update's figures, its time on the GPU included. */
 dimmer_result dimmer_lights_wait(dimmer_lights* lights, dimmer_update_stats* stats);
-/* A timeline semaphore, and the value that the last submission signals. */
+/* A timeline semaphore, and the value that the last submission signals; 0 before the first. */
 dimmer_result dimmer_lights_get_semaphore(const dimmer_lights* lights, VkSemaphore* semaphore, uint64_t* value);
 
-/* 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates. */
+/* 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates: who brings them to another layout brings
+ * them back before the next. */
 typedef struct dimmer_images {
     VkImage irradiance;
     VkImageView irradiance_view;

@@ -76,8 +76,8 @@ class LightState {
 
     // A thing that moves gets probes of its own, as many as its grid says, taken from the level's global grid by the
     // next update, and again whenever it moved or the light around it changed. Refused, with nothing changed: a grid or
-    // transform that is not finite, a singular transform; OutOfMemory where moving_probes_max is reached. Constant time
-    // but for the number of models.
+    // transform that is not finite, a singular transform; Unsupported where the pack has no global grid; OutOfMemory
+    // where moving_probes_max is reached. Constant time but for the number of models.
     Expected<Model> addModel(const ModelGrid& grid, const Transform& transform);
     Expected<void> moveModel(Model model, const Transform& transform);
     Expected<void> removeModel(Model model);

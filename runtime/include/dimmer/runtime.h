@@ -10,16 +10,16 @@
 
 namespace dimmer {
 
-// The caller's device; it must outlive the runtime. Needs Vulkan 1.2 and a queue family with compute; no optional
-// feature beyond timelineSemaphore (core in 1.2), which submit() uses.
+// The caller's device; it must outlive the runtime. Needs Vulkan 1.2, of the instance too, and a queue family with
+// compute; no optional feature beyond timelineSemaphore (core in 1.2): every runtime has such a semaphore.
 struct VulkanContext {
     VkInstance instance = VK_NULL_HANDLE;
     VkPhysicalDevice physical_device = VK_NULL_HANDLE;
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;
-    uint32_t queue_family = 0;
+    uint32_t queue_family = 0;  // the queue's, and that of the command buffers given to record()
     // Optional: a queue with compute on which submit() runs beside the other, of the same family or another one (then
-    // pages and records are shared concurrently between the two).
+    // images and buffers are shared concurrently between the two families, and no third may use them).
     VkQueue compute_queue = VK_NULL_HANDLE;
     uint32_t compute_queue_family = 0;
 };
@@ -33,9 +33,9 @@ enum class UpdateMode {
 };
 
 enum class Buffering {
-    InPlace,  // updates write the pages that frames sample; the barriers are in the caller's frame
-    // Updates write a second set of pages, which takes the first one's place when it is complete, so that frames in
-    // flight go on reading the old light. Twice the memory for pages.
+    InPlace,  // updates write the pages and probes that frames read, between barriers of their own
+    // Updates write a second set of pages, which takes the first one's place when it is complete, and one of probes, so
+    // that frames in flight go on reading the old light. Twice the memory for pages and probes.
     Double,
 };
 
@@ -55,7 +55,8 @@ struct RuntimeOptions {
     bool timestamps = true;
 };
 
-// The lightmap as a shader samples it: 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates.
+// The lightmap as a shader samples it: 2D arrays, one layer per page, in SHADER_READ_ONLY_OPTIMAL between updates: who
+// brings them to another layout brings them back before the next.
 struct LightmapImages {
     VkImage irradiance = VK_NULL_HANDLE;           // in the pack's ColorFormat; lux * exposure
     VkImageView irradiance_view = VK_NULL_HANDLE;  // VK_IMAGE_VIEW_TYPE_2D_ARRAY
@@ -73,8 +74,10 @@ struct LoadProgress {
     bool finished() const { return done_bytes == total_bytes; }
 };
 
-// What an update of submit() waits for: a semaphore that says that the frames which sampled the pages are done.
-// Timeline semaphores only: where nothing changed nothing waits, and a binary semaphore would stay signalled.
+// What an update of submit() waits for: a semaphore that says that the frames which read what it writes are done.
+// Timeline semaphores only: where nothing changed nothing waits, and a binary semaphore would stay signalled. A value
+// that nobody ever signals blocks for ever, as nothing here has a time limit: wait(), readPages(), the next record() or
+// submit() that finds work, and the destructor.
 struct SubmitWait {
     VkSemaphore semaphore = VK_NULL_HANDLE;  // null: nothing
     uint64_t value = 0;
@@ -90,30 +93,50 @@ struct DeviceFootprint {
 class Runtime : public LightState {
    public:
     // Uploads the pack's records and the base pages (blocking). Device memory: what `dimmer inspect` states.
+    // InvalidArgument: a null handle (only compute_queue may be), a queue family that the device does not have, or one
+    // without compute. Unsupported: a device below Vulkan 1.2, or without a format or limit that the pack needs.
+    // Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
-    // Waits for what submit() sent; what was record()ed must have completed, as for any Vulkan object.
+    // Waits for what submit() and continueLoading() sent, and for nothing else. Of the caller's submissions those must
+    // have completed before that have a record()ed update in them, read pages, probes or gridTable(), or wait for
+    // semaphore(). What was recorded and not submitted must not be any more.
     ~Runtime();
+    // Every handle stays valid, whatever is in flight. A runtime that was moved from may only be destroyed or assigned
+    // to; assigning destroys the one that was there, as the destructor does.
     Runtime(Runtime&&) noexcept;
     Runtime& operator=(Runtime&&) noexcept;
 
+    // What an update writes, by record() or submit(): InPlace, images() and probes(0). Double, images(pageSet() ^ 1)
+    // and probes(probeSet() ^ 1), by the numbers from before the call; afterwards pageSet() and probeSet() say what to
+    // read once it is done. While it is under way shaders may read the sets pageSet() and probeSet() from before the
+    // call (Double alone), and gridTable(), which nothing writes. Before it begins, shaders that read what it writes
+    // must be done. Its barriers see to that for earlier fragment and compute shaders on VulkanContext::queue, and for
+    // compute shaders alone on compute_queue; other stages need a barrier of the caller's before and after, other
+    // queues semaphores: SubmitWait, or a wait of the submission that has the recording.
+
     // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
-    // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. Nothing
-    // changed: records nothing (0 dispatches). A call that records overwrites the work lists that the last recording's
-    // commands read, so that one's submission must have completed on the GPU. The fence of two frames ago does not say
-    // that: with several frames in flight, submit() is the way. Buffering::Double has work lists for each set, and a
-    // call writes the sets pageSet() ^ 1 and probeSet() ^ 1, as they were before it: the last recording that wrote
-    // either must have completed. That may be the last one of all: under limits, or after sets changed places without
-    // a recording (see images()).
+    // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. The command
+    // buffer must be of VulkanContext::queue_family, and be submitted to VulkanContext::queue, once. Its compute
+    // pipeline, compute descriptor sets and push constants are others afterwards. Nothing changed: records nothing (0
+    // dispatches). With work, it first blocks until what submit() sent is done. A call that records overwrites the work
+    // lists that the last recording's commands read, so that one's submission must have completed on the GPU. The fence
+    // of two frames ago does not say that: with several frames in flight, submit() is the way. Buffering::Double has
+    // work lists for each set, and a call writes the sets pageSet() ^ 1 and probeSet() ^ 1, as they were before it: the
+    // last recording that wrote either must have completed. That may be the last one of all: under limits, or after
+    // sets changed places without a recording (see images()).
     Expected<UpdateStats> record(VkCommandBuffer commands);
-    // The commands of the last record() will never run (a frame was given up): the next update does their work.
+    // The commands of the last record() that found work will never run (a frame was given up): the next update does
+    // their work. Calls of record() and submit() that found nothing to do may have come since. Where submit() found
+    // work since, or it was taken back already, nothing happens. Of several recordings only the last can be taken back.
     void discardRecorded();
 
     // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
-    // own. Returns at once; a later call waits for the earlier update, but not for what was record()ed, which must have
-    // completed. Nothing changed: no submission, no wait, and `wait` is not waited for. Where the pages to write
-    // were sampled on another queue, `wait` must say when that is done.
+    // own. Returns at once, but for a call with work while the earlier update is still under way: it blocks until that
+    // one is done. It does not wait for what was record()ed, which must have completed. Nothing changed: no submission,
+    // no wait, and `wait` is not waited for. Where the pages or probes to write were read on another queue, `wait` must
+    // say when that is done: Double, the last frame that read images(pageSet() ^ 1) or probes(probeSet() ^ 1).
     Expected<UpdateStats> submit(const SubmitWait& wait = {});
-    // The timeline semaphore of submit() and the value that its last submission signals.
+    // The timeline semaphore of submit() and the value that its last submission signals; 0 before the first.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
     // Blocks until what submit() sent is done. Statistics of the last update that did anything, GPU time included;
@@ -151,7 +174,8 @@ class Runtime : public LightState {
     // changes anything has its pages, and its light grid's probes and tables, and nothing else.
     DeviceFootprint footprint() const;
 
-    // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime.
+    // Copies the pages to host memory (blocking; for tools and tests), layout as in CpuRuntime. Runs on
+    // VulkanContext::queue: no other queue may read them meanwhile.
     struct Pages {
         std::vector<uint32_t> irradiance, direction;
         std::vector<uint32_t> probes;  // empty where probes() is null
