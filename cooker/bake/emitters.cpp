@@ -13,7 +13,7 @@ namespace {
 
 // The faintest emitters of a group in a cell, which have this share of its light there together, are left to the gather
 // rays: they still find them, with full weight, so nothing is lost, but seldom.
-constexpr float left_share_max = 0.01f;
+constexpr float left_share_max = 1e-3f;
 // So is a group where it has less than this share of its mean light in the cells that it shines into.
 constexpr float cell_share_min = 1e-3f;
 // Every emitter sends out some of its group's rays, up to so many in all.

@@ -281,10 +281,13 @@ void Runtime::planTexels(UpdateStats& stats) {
     const bool in_place = impl.pages.size() == 1;
     impl.target = in_place ? 0 : impl.front ^ 1;
     Planner& next = planner(impl.target);
+    if (!in_place && planner(impl.front).upToDate()) {
+        next.startOver();  // a state that was called back while half of it was written is never shown
+        return;
+    }
     if (!in_place && next.mayGoOn()) {
         impl.texels_planned = next.planWaiting();  // of one state to its end: pages are shown when they are complete
     } else {
-        if (!in_place && !next.waiting() && planner(impl.front).upToDate()) return;
         impl.texels_planned = next.plan();
         // The other pages may hold the state already, when it is one of before.
         if (!impl.texels_planned) impl.front = impl.target;

@@ -185,6 +185,26 @@ TEST_F(AsyncTest, ABudgetThatGoesWithTheFrameShowsWholeStates) {
 }
 
 // Light probes are not limited: each update brings them, while the pages' state is still coming in.
+// A lamp that is lit and put out again before its pages are complete.
+TEST_F(AsyncTest, AStateThatIsCalledBackIsNeverShown) {
+    const Pack pack = packOf(test::randomPack(64));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    submitAll(gpu);
+    const auto before = gpu.readPages();
+    ASSERT_TRUE(before && gpu.setLimits({.receivers_max = 300}));
+    ASSERT_TRUE(gpu.apply("all=0.25"));
+    ASSERT_GT(gpu.submit()->receivers_waiting, 0u);
+    ASSERT_TRUE(gpu.apply("all=1"));
+    submitAll(gpu);
+    EXPECT_TRUE(gpu.readPages()->irradiance == before->irradiance);
+    ASSERT_TRUE(gpu.apply("all=0.5"));
+    for (uint32_t shown = gpu.pageSet(); gpu.pageSet() == shown;) {
+        ASSERT_TRUE(gpu.readPages()->irradiance == before->irradiance);
+        ASSERT_TRUE(gpu.submit());
+    }
+    expectFreshPages(gpu);
+}
+
 TEST_F(AsyncTest, ABudgetOfTexelsLeavesProbesUpToDate) {
     test::Random random(66);
     PackData data = test::randomPack(66);
