@@ -14,7 +14,7 @@ namespace {
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
 // Of two fluxes only the ratio counts: what the last bounces bring goes to both.
-constexpr float measured_tail_max = 0.02f;
+constexpr float measured_tail_max = 0.05f;
 
 // Between two doors' leaves, before they count as out of sight of each other; and how far from the leaves' surface
 // towards the middle they start.
