@@ -28,7 +28,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
         FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
-        std::vector<uint32_t> terms, of_group;
+        std::vector<uint32_t> terms, of_group, bounced;
         RowEnds own_ends;
         if (ends) own_ends.kept_max = ends->keptMax();
         std::vector<RowEnds> all_ends;
@@ -36,18 +36,22 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
         for (size_t i = begin; i < end; ++i) {
             series.activeTerms(i, terms);
             std::erase_if(terms, [&](uint32_t t) { return !groups[gatherer.paths().terms()[t].group]; });
+            bounced.clear();
+            for (const TermLight& l : series.bounced.row(i))
+                if (luminance(l.value) > 0) bounced.push_back(l.term);
             row.clear();
             own_ends.clear();
             if (known && !terms.empty()) known->get(i, own_ends);
             if (!settings.per_set_passes)
-                traced +=
-                    gather.gather(gatherer.at(i), terms, series.radiance, options, row, ends ? &own_ends : nullptr);
+                traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row,
+                                        ends ? &own_ends : nullptr, bounced);
             if (remembers) all_ends.push_back(own_ends);
             for (uint32_t g = 0; settings.per_set_passes && g < gatherer.paths().groupCount(); ++g) {
                 of_group.clear();
                 std::ranges::copy_if(terms, std::back_inserter(of_group),
                                      [&](uint32_t t) { return gatherer.paths().group(t) == g; });
-                if (!of_group.empty()) traced += gather.gather(gatherer.at(i), of_group, series.radiance, options, row);
+                if (of_group.empty()) continue;
+                traced += gather.gather(gatherer.at(i), of_group, series.radiance, options, row, nullptr, bounced);
             }
             if (settings.per_set_passes) std::ranges::sort(row, {}, &ReceiverLight::term);
             // Neighbours' light may end at a wall that the chart runs under.

@@ -31,7 +31,7 @@ struct BakeSettings {
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
     bool denoise = false;          // filter what noise is left, in lightmap space
     uint32_t bounces_max = 64;
-    float tail_max = 0.002f;                   // stop when of a place's light less is still to come, in their mean
+    float tail_max = 0.002f;                   // stop when less of places' light is still to come, in the mean
     float threshold = 0.01f;                   // activity, as a share of a term's mean; see TermReport
     std::vector<float> group_thresholds = {};  // the same for each light group; empty: one for all
     float door_share = 0.2f;  // 0..1: a term with doors has at least this share of its group's threshold

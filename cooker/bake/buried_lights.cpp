@@ -1,5 +1,7 @@
 #include <bake/buried_lights.h>
 
+#include <bake/punctual.h>
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -21,8 +23,8 @@ glm::vec3 directionOf(int i) {
 int backsAround(const RayScene& rays, glm::vec3 place) {
     int backs = 0;
     for (int i = 0; i < directions; ++i) {
-        const auto hit =
-            rays.nearest(place, directionOf(i), std::numeric_limits<float>::infinity(), 0, Surfaces::Walls);
+        const auto hit = rays.nearest(place + directionOf(i) * lamp_lift_m, directionOf(i),
+                                      std::numeric_limits<float>::infinity(), 0, Surfaces::Walls);
         if (!hit || !hit->back) continue;
         backs += !rays.scene().materials[rays.triangles()[hit->triangle].material].double_sided;
     }

@@ -68,8 +68,7 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t
         for (const Illumination& l : lit) {
             const float flux = luminance(l.irradiance_lux);
             if (!(flux > flux_share_min * sum)) continue;
-            const float distance_m = std::isinf(l.distance_m) ? far_away_m : l.distance_m;
-            if (!(rays.transmittance(point, l.towards_light, distance_m, Surfaces::Walls) > 0)) continue;
+            if (!(rays.transmittance(point, l.towards_light, shadowRayLengthM(l), Surfaces::Walls) > 0)) continue;
             const auto hit = rays.nearest(point, -l.towards_light, far_away_m, hash(seed, i), Surfaces::Walls);
             if (hit && !hit->back) photons.push_back({point - l.towards_light * hit->distance_m, flux});
         }

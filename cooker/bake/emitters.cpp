@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 namespace dimmer::cook {
@@ -14,8 +15,11 @@ namespace {
 // The faintest emitters of a group in a cell, which have this share of its light there together, are left to the gather
 // rays: they still find them, with full weight, so nothing is lost, but seldom.
 constexpr float left_share_max = 1e-3f;
-// So is a group where it has less than this share of its mean light in the cells that it shines into.
-constexpr float cell_share_min = 1e-3f;
+// So is a group where it has less than this share of its mean light in the cells that it shines into, and fills less
+// than that share of the hemisphere.
+constexpr float cell_share_min = 1e-3f, coverage_min = 1e-5f;
+// Choices take 12 bytes for each cell: of more, all cells share those by power. So many more are not even sorted.
+constexpr size_t choices_max = 1024, sorted_max = 8 * choices_max;
 // Every emitter sends out some of its group's rays, up to so many in all.
 constexpr uint32_t rays_per_emitter = 128, probe_rays_max = 65536;
 constexpr float lift_m = 1e-3f;  // off the emitter
@@ -30,17 +34,27 @@ glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
 }
 
-// Takes those of the least weight out, from `first` on, that have `left_max` together at most. Keeps the order.
-void leaveFaintest(auto& choices, size_t first, float left_max) {
+// Takes those of the least weight out that have `left_max` together at most. Keeps the order.
+void leaveFaintest(auto& choices, float left_max) {
     std::vector<float> weights;
-    for (size_t i = first; i < choices.size(); ++i) weights.push_back(choices[i].probability);
+    for (const auto& c : choices) weights.push_back(c.probability);
     std::ranges::sort(weights);
     float left = 0;
     size_t count = 0;
     while (count + 1 < weights.size() && left + weights[count] <= left_max) left += weights[count++];
-    const auto tail = std::remove_if(choices.begin() + static_cast<long>(first), choices.end(),
-                                     [&](const auto& c) { return c.probability < weights[count]; });
-    choices.erase(tail, choices.end());
+    std::erase_if(choices, [&](const auto& c) { return c.probability < weights[count]; });
+}
+
+// Of weights, as probabilities. Summed up in double: a hundred thousand of them would add up to a thousandth more
+// than 1.
+void makeProbabilities(auto& choices) {
+    double sum = 0, cumulative = 0;
+    for (const auto& c : choices) sum += static_cast<double>(c.probability);
+    for (auto& c : choices) {
+        cumulative += static_cast<double>(c.probability);
+        c.probability = static_cast<float>(static_cast<double>(c.probability) / sum);
+        c.cumulative = static_cast<float>(cumulative / sum);
+    }
 }
 
 }  // namespace
@@ -89,25 +103,44 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
 
 // All cells' ranges and choices in one array each, without the groups that are faint there.
 void EmitterSampler::gatherCells() {
-    std::vector<double> light(identities_.size()), cells(identities_.size());
+    struct Group {
+        double light = 0, cells = 0;
+        std::optional<GroupRange> by_power;
+    };
+    std::vector<Group> groups(identities_.size());
     for (const Cell& cell : cells_)
-        for (size_t r = 0; r < cell.ranges.size(); ++r) {
-            light[cell.ranges[r].group] += static_cast<double>(cell.light[r]);
-            ++cells[cell.ranges[r].group];
+        for (const CellRange& r : cell) {
+            groups[r.group].light += static_cast<double>(r.light);
+            ++groups[r.group].cells;
         }
     first_range_.push_back(0);
-    for (const Cell& cell : cells_) {
-        for (size_t r = 0; r < cell.ranges.size(); ++r) {
-            GroupRange range = cell.ranges[r];
-            if (static_cast<double>(cell.light[r] / cell_share_min) * cells[range.group] < light[range.group]) continue;
-            const auto choices = std::span(cell.choices).subspan(range.first, range.count);
-            range.first = static_cast<uint32_t>(choices_.size());
-            choices_.insert(choices_.end(), choices.begin(), choices.end());
-            ranges_.push_back(range);
+    for (Cell& cell : cells_) {
+        for (const CellRange& r : cell) {
+            Group& group = groups[r.group];
+            const double least = static_cast<double>(cell_share_min) * group.light / group.cells;
+            if (!r.wide && static_cast<double>(r.light) < least) continue;
+            if (r.choices.empty() && !group.by_power) group.by_power = store(r.group, choicesByPower(r.group));
+            ranges_.push_back(r.choices.empty() ? *group.by_power : store(r.group, r.choices));
         }
         first_range_.push_back(static_cast<uint32_t>(ranges_.size()));
+        cell = {};
     }
     cells_ = {};
+}
+
+EmitterSampler::GroupRange EmitterSampler::store(uint32_t group, std::span<const Choice> choices) {
+    const auto first = static_cast<uint32_t>(choices_.size());
+    choices_.insert(choices_.end(), choices.begin(), choices.end());
+    return {group, identities_[group], first, static_cast<uint32_t>(choices.size())};
+}
+
+std::vector<EmitterSampler::Choice> EmitterSampler::choicesByPower(uint32_t group) const {
+    std::vector<Choice> choices;
+    for (uint32_t i = 0; i < emitters_.size(); ++i)
+        if (emitters_[i].group == group)
+            choices.push_back({i, luminance(emitters_[i].radiance_cd_m2) * emitters_[i].area_m2, 0});
+    makeProbabilities(choices);
+    return choices;
 }
 
 std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<const Emitter> of_group) const {
@@ -137,42 +170,33 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
 }
 
 void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>> lit) {
-    Cell& cell = cells_[index];
     const glm::vec3 centre = grid_.centre(index);
     const float radius_m = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
     for (size_t begin = 0, g = 0; begin < emitters_.size(); ++g) {
-        const uint32_t group = emitters_[begin].group;
-        const size_t first = cell.choices.size();
-        float sum = 0;
         size_t end = begin;
-        while (end < emitters_.size() && emitters_[end].group == group) ++end;
+        while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
         const size_t range_begin = std::exchange(begin, end);
         if (!lit[g][index]) continue;
+        std::vector<Choice> choices;
+        float sum = 0, brightest = 0;
         for (size_t i = range_begin; i < end; ++i) {
             const Emitter& e = emitters_[i];
             const glm::vec3 to_centre = centre - (e.corner + (e.edge1 + e.edge2) / 3.0f);
+            brightest = std::max(brightest, luminance(e.radiance_cd_m2));
             if (!e.double_sided && glm::dot(centre - e.corner, e.normal) < -radius_m) continue;
             const float near2 = radius_m * radius_m + e.area_m2;
             const float weight =
                 luminance(e.radiance_cd_m2) * e.area_m2 / std::max(glm::dot(to_centre, to_centre), near2);
-            cell.choices.push_back({static_cast<uint32_t>(i), weight, 0});
+            choices.push_back({static_cast<uint32_t>(i), weight, 0});
             sum += weight;
         }
-        if (!(sum > 0)) {
-            cell.choices.resize(first);
-            continue;
-        }
-        leaveFaintest(cell.choices, first, left_share_max * sum);
-        cell.light.push_back(sum);
-        float kept = 0, cumulative = 0;
-        for (size_t i = first; i < cell.choices.size(); ++i) kept += cell.choices[i].probability;
-        for (size_t i = first; i < cell.choices.size(); ++i) {
-            cell.choices[i].probability /= kept;
-            cumulative += cell.choices[i].probability;
-            cell.choices[i].cumulative = cumulative;
-        }
-        cell.ranges.push_back({group, identities_[group], static_cast<uint32_t>(first),
-                               static_cast<uint32_t>(cell.choices.size() - first)});
+        if (!(sum > 0)) continue;
+        if (choices.size() <= sorted_max) leaveFaintest(choices, left_share_max * sum);
+        if (choices.size() > choices_max) choices = {};
+        makeProbabilities(choices);
+        choices.shrink_to_fit();
+        cells_[index].push_back(
+            {emitters_[range_begin].group, sum, sum > coverage_min * pi * brightest, std::move(choices)});
     }
 }
 

@@ -39,7 +39,8 @@ inline constexpr uint32_t emitter_probe_rays = 2048;
 
 // The chance of each emitter, per light group and per cell of a coarse grid: power over squared distance. Groups never
 // compete with one another, so adding a set changes nothing for the others. Cells that a group does not shine into, as
-// far as a few rays tell, do not ask for it; rays that hit its emitters from there count in full, so nothing is lost.
+// far as a few rays tell, or only faintly, do not ask for it; rays that hit its emitters from there count in full, so
+// nothing is lost. Of a group with thousands of emitters, chances are by power alone, for all cells together.
 class EmitterSampler {
    public:
     EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups);
@@ -70,15 +71,20 @@ class EmitterSampler {
         float probability;
         float cumulative;  // up to and including this one
     };
-    struct Cell {
-        std::vector<GroupRange> ranges;
+    // What a cell asks of one group; no choices of its own where there would be too many.
+    struct CellRange {
+        uint32_t group;
+        float light;  // radiance times solid angle, about
+        bool wide;    // it fills a share of the hemisphere that counts
         std::vector<Choice> choices;
-        std::vector<float> light;  // per range: radiance times solid angle, about
     };
+    using Cell = std::vector<CellRange>;
     std::vector<uint8_t> litCells(const RayScene& rays, std::span<const Emitter> of_group) const;
     // `lit`: per range of emitters of one group, in order, the cells that it shines into.
     void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);
     void gatherCells();
+    std::vector<Choice> choicesByPower(uint32_t group) const;
+    GroupRange store(uint32_t group, std::span<const Choice> choices);
 
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;

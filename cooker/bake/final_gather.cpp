@@ -117,7 +117,8 @@ RowEnds* FinalGather<Light>::endsOfRound(RowEnds* row, uint32_t round) {
 template <class Light>
 uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint32_t> terms,
                                     const SparseLight& outgoing, const FinalGatherOptions& options,
-                                    std::vector<LightOfTerm<Light>>& out, RowEnds* ends) {
+                                    std::vector<LightOfTerm<Light>>& out, RowEnds* ends,
+                                    std::span<const uint32_t> bounced) {
     for (uint32_t t : terms) {
         state_[t] = {};
         want(t, true);
@@ -145,8 +146,9 @@ uint64_t FinalGather<Light>::gather(const GatherFrom& from, std::span<const uint
             if (s.done) continue;
             s.add(round_[t]);
             const float interval = normal_95 * std::sqrt(s.varianceOfMean());
-            // A term that is active here and that no ray has found yet may come from a small bright place.
-            s.done = r + 1 >= rounds_min && options.noise_max > 0 && s.mean > 0 &&
+            // What no ray has found yet may come from a small bright place.
+            const bool sought = s.mean == 0 && std::ranges::binary_search(bounced, t);
+            s.done = r + 1 >= rounds_min && options.noise_max > 0 && !sought &&
                      interval <= options.noise_max * (s.mean + options.floor_lux[t]);
             const bool aimed = aim_of_term_[t] != 0, look = r + 1 >= rounds_min && std::has_single_bit(r + 1);
             if (aimed && (s.done || (look && !aimPays(t)))) leaveAim(t);

@@ -41,9 +41,11 @@ class FinalGather {
     // Appends to `out` the light of `terms` (ascending) at `from`. Rays are shared, decisions are not: a term's
     // value and sample count do not depend on which terms of other light groups are asked for. Of its own group, terms
     // that are not asked for count for it where it takes them along (DoorPaths::moreClosed). `ends`, when given: of the
-    // first rays, and takes those of others, up to RowEnds::kept_max. Returns the rays traced.
+    // first rays, and takes those of others, up to RowEnds::kept_max. `bounced`: terms (ascending) of which surfaces
+    // are known to send light here; they go on until a ray has found some. Returns the rays traced.
     uint64_t gather(const GatherFrom& from, std::span<const uint32_t> terms, const SparseLight& outgoing,
-                    const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out, RowEnds* ends = nullptr);
+                    const FinalGatherOptions& options, std::vector<LightOfTerm<Light>>& out, RowEnds* ends = nullptr,
+                    std::span<const uint32_t> bounced = {});
 
    private:
     struct State {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <numeric>
 
 namespace dimmer::cook {
 namespace {
@@ -422,7 +423,9 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
     const auto samples = static_cast<float>(options.emitter_samples);
     const uint32_t any_point = hash(options.seed, from.id);
     // Each of the receiver's points gets each part of the group's emitters, in turns: they may be shadowed differently.
-    const uint32_t turn = options.first_ray / std::max(options.rays, 1u);
+    const auto points = static_cast<uint32_t>(from.points.size());
+    const uint32_t rounds_for_all = points / std::gcd(points, options.emitter_samples);
+    const uint32_t turn = options.first_ray / std::max(options.rays, 1u) / rounds_for_all;
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;
         const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];

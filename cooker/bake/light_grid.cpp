@@ -1,6 +1,7 @@
 #include <bake/light_grid.h>
 
 #include <bake/door_paths.h>
+#include <bake/punctual.h>
 #include <bake/sampling.h>
 
 #include <tbb/parallel_for.h>
@@ -80,9 +81,9 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
     for (uint32_t i = 0; i < light_probe_rays; ++i) {
         // Through doors: what is behind them is lit once they open.
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
-        const auto hit = rays.nearest(light.position_m, d, far_m, hash(identity_[index], i), Surfaces::Walls);
-        const float stop_m = hit ? hit->distance_m : far_m;
-        grid_.mark(light.position_m, d, stop_m, spread, marks);
+        const glm::vec3 from = light.position_m + d * lamp_lift_m;
+        const auto hit = rays.nearest(from, d, far_m, hash(identity_[index], i), Surfaces::Walls);
+        grid_.mark(from, d, hit ? hit->distance_m : far_m, spread, marks);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)

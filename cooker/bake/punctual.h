@@ -16,10 +16,12 @@ struct Illumination {
     glm::vec3 irradiance_lux{0};  // on a surface that faces the light, nothing between
 };
 
-// How far a shadow ray goes: to a little before a lamp, as one that lies in a surface, a ceiling's say, shines from it.
+// Rays to and from lamps leave out so much beside them: one that lies in a surface, a ceiling's say, shines from it.
+inline constexpr float lamp_lift_m = 5e-4f;
+
+// How far a shadow ray goes.
 inline float shadowRayLengthM(const Illumination& lit) {
-    constexpr float lift_m = 5e-4f;
-    return std::isinf(lit.distance_m) ? far_away_m : std::max(0.0f, lit.distance_m - lift_m);
+    return std::isinf(lit.distance_m) ? far_away_m : std::max(0.0f, lit.distance_m - lamp_lift_m);
 }
 
 // What `light` does at `point`. Inverse square with a least distance of 1 cm, windowed by the range; spots by the glTF

@@ -223,7 +223,8 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     weigh(lamp_sources_, vertex.point, path.weights);
     const uint32_t lamp = pick(path.weights, path.next() * vertex.lamp_weight_sum);
     const PunctualLight& light = rays_.scene().lights[lamps_[lamp].index];
-    const auto hit = rays_.nearest(light.position_m, lampDirection(light, path.next2()), far_away_m, path.nextBits());
+    const glm::vec3 away = lampDirection(light, path.next2());
+    const auto hit = rays_.nearest(light.position_m + away * lamp_lift_m, away, far_away_m, path.nextBits());
     const auto lit = hit ? vertexAt(*hit) : std::nullopt;
     if (!lit) return glm::vec3(0);
     const glm::vec3 to_lit = lit->point - vertex.point;

@@ -11,7 +11,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <limits>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -244,8 +244,8 @@ class Expansion {
 
     // Of one light group, over places that count alike: what lies in a dim room as well as what the sun lights.
     struct Flux {
-        double sum = 0,
-               step = 0;   // bounced so far; what the last round changed, either way; shares of what is there, m2
+        // Shares of what is there, m2: bounced so far; what the last round changed, either way.
+        double sum = 0, step = 0;
         double ratio = 1;  // of the last two steps
         double ratio_at_leap = 0;
     };
@@ -254,12 +254,17 @@ class Expansion {
         // Of each group the area that has light, then the light, and later the step.
         const size_t count = groups.size();
         const Sums all = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
-            for (size_t i = begin; i < end; ++i)
+            std::vector<float> there(count);  // of each group
+            for (size_t i = begin; i < end; ++i) {
+                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value);
                 for (const TermLight& l : out_.bounced.row(i)) {
-                    sum.of[2 * paths_.group(l.term)] += static_cast<double>(gatherer_.areaM2(i));
-                    sum.of[2 * paths_.group(l.term) + 1] +=
-                        static_cast<double>(gatherer_.areaM2(i) * luminance(l.value));
+                    const size_t group = paths_.group(l.term);
+                    const float lux = std::exchange(there[group], 0.0f);
+                    if (!(lux > 0)) continue;
+                    sum.of[2 * group] += static_cast<double>(gatherer_.areaM2(i));
+                    sum.of[2 * group + 1] += static_cast<double>(gatherer_.areaM2(i) * lux);
                 }
+            }
         });
         std::vector<float> floor_lux;
         for (size_t g = 0; g < count; ++g)

@@ -30,7 +30,7 @@ struct Quality {
     uint32_t denoise = 0;            // 1: filter the noise that is left
     uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
     uint32_t bounces = 64;           // at most
-    float tolerance = 0.002f;        // bounces stop when of a place's light less is still to come, in their mean
+    float tolerance = 0.002f;        // bounces stop when less of places' light is still to come, in the mean
     uint32_t zstd_level = 7;         // of the pack's chunks
     bool per_set_passes = false;     // see BakeSettings; from the command line alone
     bool light_grid = true;          // likewise

@@ -34,7 +34,7 @@ uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::span<const u
                                        std::vector<LightOfTerm<Light>>& row) {
     const uint64_t shadow_rays = findActive(from, groups);
     row.clear();
-    const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row);
+    const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row, nullptr, bounced_);
     for (LightOfTerm<Light>& l : row)
         if (const auto touched = stored_.touched(); std::ranges::binary_search(touched, l.term))
             l.light += stored_[l.term];
@@ -52,6 +52,10 @@ uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from, std::span<con
                       .seed = settings_.seed,
                       .wanted_in_group = {}},
                      &series_.radiance, sum_, nullptr);
+    bounced_.clear();
+    for (const uint32_t t : sum_.touched())
+        if (luminance(sum_[t].irradiance()) > 0) bounced_.push_back(t);
+    std::ranges::sort(bounced_);
     active_.assign(1, always_group);
     for (auto* light : {&direct_, &sum_}) {
         for (const uint32_t t : light->touched()) {

@@ -35,7 +35,7 @@ class ReceiverGather {
     FinalGatherOptions options_;
     FinalGather<Light> final_;
     TermAccumulator<Light> sum_, direct_, stored_;
-    std::vector<uint32_t> active_;
+    std::vector<uint32_t> active_, bounced_;  // terms; of the latter, light came from surfaces
 };
 
 using ProbeGather = ReceiverGather<ProbeLight>;
