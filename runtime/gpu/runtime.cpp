@@ -335,6 +335,7 @@ void Runtime::rollback() {
     if (impl_->texels_planned) planner(impl_->target).rollback();
     if (impl_->probes_planned) probePlanner(impl_->probe_target).rollback();
     if (impl_->models_planned) models().rollback(impl_->probe_target);
+    impl_->stats = {};
     impl_->timed = false;
 }
 
@@ -384,8 +385,8 @@ void Runtime::discardRecorded() {
     impl.target = recorded->target;
     impl.probe_target = recorded->probe_target;
     rollback();
-    impl.front = recorded->front;
-    impl.probe_front = recorded->probe_front;
+    if (recorded->texels) impl.front = recorded->front;
+    if (recorded->probes || recorded->models) impl.probe_front = recorded->probe_front;
 }
 
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {

@@ -205,7 +205,9 @@ Expected<void> validateGlobalGrid(const PackData& d) {
     if (!finite(start.min_m) || !finite(start.max_m)) return unusable("its global grid's box is not finite");
     uint64_t cells = 1;
     for (size_t axis = 0; axis < 3; ++axis) {
-        if (!grid.empty() && !(start.min_m[axis] < start.max_m[axis])) return unusable("its global grid's box is flat");
+        const float extent_m = start.max_m[axis] - start.min_m[axis];
+        if (!grid.empty() && !(extent_m > 1e-30f && extent_m < 1e30f))  // what reciprocal() is good for
+            return unusable("its global grid's box is flat or without end");
         // Each factor is at most the number of cells that are there, so that the product cannot overflow.
         if (start.counts[axis] > grid.starts.size()) return unusable("its starts of walks do not fill their box");
         cells = std::min<uint64_t>(cells * start.counts[axis], UINT32_MAX);

@@ -5,6 +5,7 @@
 #include <spirv/blend_texels_comp.h>
 #include <spirv/gather_texels_comp.h>
 #include <spirv/resample_probes_comp.h>
+#include <spirv/sample_lightmap_comp.h>
 #include <spirv/scatter_texels_comp.h>
 
 #include <bit>
@@ -17,18 +18,22 @@ namespace {
 
 // SPIR-V 1.5, sections 2.3 and 3.42: a header of 5 words, then instructions whose first word is length and opcode. Of
 // what Vulkan 1.2 rounds only nearly ("Precision and Operation of SPIR-V Instructions") kernels could ask for division,
-// remainders, and functions of GLSL.std.450, of which min, max and the like are exact.
+// remainders, sums of products in an order of the device's own, and functions of GLSL.std.450, of which min, max and
+// the like are exact.
 size_t inexactInstructions(std::span<const uint32_t> words) {
     constexpr uint32_t op_ext_inst = 12, op_f_div = 136, op_f_rem = 140, op_f_mod = 141;
-    constexpr uint32_t radians = 11, pack_half = 58;  // GLSL.std.450: trigonometry, powers, roots; and interpolation
+    constexpr uint32_t vector_times_matrix = 144, dot = 148;
+    constexpr uint32_t radians = 11, pack = 54, length = 66, refract = 72;  // GLSL.std.450
     size_t count = 0;
     for (size_t at = 5; at < words.size(); at += std::max(words[at] >> 16, 1u)) {
         const uint32_t op = words[at] & 0xffff;
         if (op == op_f_div || op == op_f_rem || op == op_f_mod) ++count;
+        if (op >= vector_times_matrix && op <= dot) ++count;
         if (op != op_ext_inst) continue;
         const uint32_t function = words[at + 4];
         const bool min_max_clamp = function >= 37 && function <= 45;
-        if (function >= radians && function < pack_half && !min_max_clamp) ++count;
+        const bool geometric = function >= length && function <= refract;
+        if (geometric || (function >= radians && function < pack && !min_max_clamp)) ++count;
     }
     return count;
 }
@@ -39,6 +44,7 @@ TEST(ExactArithmetic, KernelsAskForNothingThatDevicesRoundInTheirOwnWay) {
     EXPECT_EQ(inexactInstructions(spirv::resample_probes_comp), 0u);
     EXPECT_EQ(inexactInstructions(spirv::gather_texels_comp), 0u);
     EXPECT_EQ(inexactInstructions(spirv::scatter_texels_comp), 0u);
+    EXPECT_GT(inexactInstructions(spirv::sample_lightmap_comp), 0u) << "which takes roots";
 }
 
 TEST(ExactArithmetic, ReciprocalsAreRightOverTheirRange) {
