@@ -136,7 +136,13 @@ Expected<void> checkArguments(const CookArguments& a) {
         inputs.push_back({"--profile", a.options.profile});
     addFilesOf("--profile", filesExtendedBy(a.options.profile), inputs);
     if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" stands for a file here
-    inputs.push_back({"--cache", cacheOf(a), true});              // a cook does without one that cannot be written
+    if (a.options.cache == "-") return fail(ErrorCode::InvalidArgument, "--cache: '-' is not a folder");
+    // A cook does without one that cannot be written; but it is made, with what is above it, before the bake.
+    const auto cache = cacheOf(a);
+    inputs.push_back({"--cache", cache, true});
+    for (auto above = cache.parent_path(); !above.empty() && !std::filesystem::exists(above);
+         above = above.parent_path())
+        inputs.push_back({"--cache", above, true});
     return checkFiles(inputs, {{"--output", a.options.pack},
                                printed("--json", a.json),
                                {"--write-level", a.write_level},

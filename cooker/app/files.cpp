@@ -36,7 +36,7 @@ bool same(const fs::path& a, const fs::path& b) {
     if (fs::exists(status_a) && fs::exists(status_b)) return fs::equivalent(a, b, ignored);
     // What is not there yet has no identity but its name.
     const auto name = [&](const fs::path& path) {
-        const fs::path target = behindLinks(path).value_or(path);
+        const fs::path target = behindLinks(path.has_filename() ? path : path.parent_path()).value_or(path);
         const fs::path absolute = fs::absolute(target, ignored);
         const fs::path canonical = fs::weakly_canonical(absolute, ignored);
         return (ignored ? absolute : canonical).lexically_normal();

@@ -416,9 +416,13 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         const auto density_steps =
             std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
-        if (remedy.changes.empty())
-            return fail(ErrorCode::OverBudget, within.error().message + "; nothing that --fit changes would help" +
-                                                   changedBefore(result.fitted));
+        if (remedy.changes.empty()) {
+            const auto found = remedies(*pack, cost, result.profile, losses);
+            const char* why = found.empty() ? "; nothing that --fit changes would help"
+                                            : "; all that --fit changes would not be enough";
+            return fail(ErrorCode::OverBudget,
+                        within.error().message + why + waysOut(found) + changedBefore(result.fitted));
+        }
         for (const Change& c : remedy.changes)
             if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
                 return std::unexpected(ok.error());

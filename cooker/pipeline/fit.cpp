@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -309,10 +310,14 @@ uint32_t largestSet(const PackData& pack, const PackCost& cost) {
 // predicted, without a margin: what is in doubt is tried.
 bool mayFit(const PackData& pack, PackCost cost, Profile profile, const LossTable& losses, bool without_grids) {
     const LossTable::TexelsLeft left = losses.texelsLeft(density_factor_max);
+    if (without_grids) {
+        cost.dynamic -= probeRecords(cost, losses);
+        cost.global_grid = cost.local_grids = 0;
+        for (ElementCost& e : cost.elements) e.bytes -= std::exchange(e.probe_bytes, 0);
+    }
     cost.base_lightmap = scaled(cost.base_lightmap, left.pages);
     cost.dynamic = scaled(cost.dynamic, left.charts);
     cost.ancillary = scaled(cost.ancillary, left.charts);
-    if (without_grids) cost.global_grid = cost.local_grids = 0;
     profile.budget_per_element = scaled(profile.budget_per_element, 1 / left.charts);
     const Rungs highest(losses.groupCount(), static_cast<uint8_t>(threshold_rungs.size() - 1));
     return !baseIsOver(cost, profile) && !exceeded(limitsOf(pack, cost, profile, losses), highest);

@@ -37,7 +37,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
 
 // What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do;
 // and of probes where the total is too much; further than predicted where so many steps of density fell short.
-// Empty where all of that together is predicted not to do.
+// Empty where all of that together, texels no more than 16 times as long as they are now, is predicted not to do.
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                      size_t density_steps = 0);
 

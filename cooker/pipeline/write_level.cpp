@@ -297,12 +297,14 @@ class LevelWriter {
     // Files that the level names relative to itself, seen from the new place.
     void moveReferences(const std::filesystem::path& from, const std::filesystem::path& to) {
         const auto old_folder = realFolderOf(from), new_folder = realFolderOf(behindLinks(to).value_or(to));
-        if (old_folder == new_folder) return;
+        // A file that is a link itself is read from two folders.
+        const bool by_two_names = realFolderOf(to) != new_folder;
+        if (old_folder == new_folder && !by_two_names) return;
         const auto move = [&](Json& uri) {
             const std::string text = uri.get<std::string>();
             if (text.starts_with("data:")) return;
             const auto file = old_folder / text, seen = file.lexically_relative(new_folder);
-            uri = (seen.empty() ? file : seen).generic_string();
+            uri = (seen.empty() || by_two_names ? file : seen).generic_string();
         };
         Json& d = document_.json;
         const Json::json_pointer sky("/scenes/" + std::to_string(d.value("scene", 0)) + "/extras/dimmer_sky_image");

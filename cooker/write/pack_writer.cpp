@@ -299,18 +299,25 @@ Expected<void> writeToSpecialFile(const std::filesystem::path& path, std::span<c
     return {};
 }
 
-// The rights of a file that is there; none of what is none.
-std::optional<mode_t> rightsOf(const std::filesystem::path& path) {
+// A file that is there; nothing of what is none.
+std::optional<struct stat> fileAt(const std::filesystem::path& path) {
     struct stat status {};
     if (stat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return {};
-    return status.st_mode & 0777;
+    return status;
 }
 
-// mkstemp's files are private: this one gets the rights of the one that it replaces, or those of any new file.
-bool giveRights(int file, std::optional<mode_t> replaced) {
+// mkstemp's files are private: this one gets owner, group and rights of the one that it replaces. Where the owner
+// cannot be kept, the usual rights of a new file, as those of before were for another; where the group cannot, none for
+// it.
+bool giveRights(int file, const std::optional<struct stat>& replaced) {
     const mode_t mask = umask(0);
     umask(mask);
-    return fchmod(file, replaced.value_or(0666 & ~mask)) == 0;
+    mode_t rights = 0666 & ~mask;
+    if (replaced && fchown(file, replaced->st_uid, replaced->st_gid) == 0)
+        rights = replaced->st_mode & 0777;
+    else if (replaced && replaced->st_uid == geteuid())
+        rights = replaced->st_mode & 0707;
+    return fchmod(file, rights) == 0;
 }
 
 // What mkstemp makes random behind the name of a file that is replaced.
@@ -322,7 +329,7 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
     const int file = mkstemp(temporary.data());
     if (file < 0) return ioError(path, "no file can be made in this folder", errno);
     const bool written =
-        writeAll(file, bytes) && giveRights(file, rightsOf(path)) && (flush == Flush::No || fsync(file) == 0);
+        writeAll(file, bytes) && giveRights(file, fileAt(path)) && (flush == Flush::No || fsync(file) == 0);
     const int error = written ? 0 : errno;
     close(file);
     if (written && rename(temporary.c_str(), path.c_str()) == 0) return {};
@@ -355,7 +362,7 @@ Expected<void> checkReplaceable(const std::filesystem::path& path) {
     if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0)
         return ioError(path, "no file can be made in this folder", errno);
     // The bits themselves, as root may write anything, and a rename asks nobody.
-    if (const auto rights = rightsOf(path); rights && (*rights & 0222) == 0)
+    if (const auto file = fileAt(path); file && (file->st_mode & 0222) == 0)
         return fail(ErrorCode::Io, fmt::format("{}: is read-only", path.string()));
     const auto tooLong = [&](size_t bytes, int limit) {
         const long most = pathconf(folder.c_str(), limit);  // of paths: with the 0 at their end

@@ -26,8 +26,9 @@ std::mutex& fileReplacement();
 // Whether a file has to survive a power cut right after it was written.
 enum class Flush { Yes, No };
 
-// Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete, with the
-// rights that it had. Links are followed; devices and pipes are written to directly. What is read-only is an error.
+// Writes a temporary file beside `path`, flushes it, and renames it: `path` is either as before or complete, with
+// owner, group and rights that it had, as far as one may give these. Links are followed; devices and pipes are written
+// to directly. What is read-only is an error.
 Expected<void> writeFileAtomically(const std::filesystem::path& path, std::span<const std::byte> bytes,
                                    Flush flush = Flush::Yes);
 

@@ -181,8 +181,12 @@ TEST_F(Outputs, NeverTheCache) {
     const std::string new_pack = file("other.dimmer"), folder = file("new_cache");
     expectSameFile({"cook", level(), "-o", new_pack, "--cache", new_pack}, "--output", "--cache");
     expectSameFile({"cook", level(), "-o", new_pack, "--report", folder, "--cache", folder}, "--report", "--cache");
+    expectSameFile({"cook", level(), "-o", new_pack, "--report", folder, "--cache", folder + "/"}, "--report",
+                   "--cache");
+    expectSameFile({"cook", level(), "-o", new_pack, "--cache", new_pack + "/in/it"}, "--output", "--cache");
     std::filesystem::create_directory(file("empty"));
     expectSameFile({"cook", level(), "-o", file("empty/.dimmer-cache")}, "--output", "--cache");
+    expectRefusedAtOnce({"cook", level(), "-o", new_pack, "--cache", "-"}, {"--cache: '-' is not a folder"});
     for (const std::string& path : {new_pack, folder, file("empty/.dimmer-cache")})
         EXPECT_FALSE(std::filesystem::exists(path)) << path;
 }

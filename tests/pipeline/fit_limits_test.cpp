@@ -87,6 +87,20 @@ TEST(FitLimits, ProbesGiveAllWhereTexelsGiveNothing) {
     EXPECT_TRUE(remedy.fits);
 }
 
+// Records of probes go with them: 20 kB of fixed pages, 80 of grid and 100 of records make 60 kB with few enough
+// probes.
+TEST(FitLimits, RecordsOfProbesGoWithThem) {
+    PackCost cost;
+    cost.base_lightmap = 20000;
+    cost.global_grid = 80000;
+    cost.dynamic = 100000;
+    Profile profile;
+    profile.budget_total = 60000;
+    const Remedy remedy = fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true));
+    ASSERT_FALSE(remedy.changes.empty());
+    EXPECT_EQ(remedy.changes.back().key, "grids.probes_max");
+}
+
 // No grid of a model has less than 8 probes: one round finds that out, and its figures are not those of the settings
 // that were asked for.
 TEST(FitLimits, TheErrorTellsWhatHadBeenChanged) {

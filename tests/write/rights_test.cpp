@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <scene/level_file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include <write/pack_writer.h>
 
 #include <string>
@@ -39,6 +40,18 @@ TEST_F(RightsOfAFile, StayThoseOfTheOneThatWasReplaced) {
     }
     ASSERT_EQ(chmod(path_.c_str(), 0600), 0);
     EXPECT_EQ(readText(path_), "new");
+}
+
+TEST_F(RightsOfAFile, BelongToWhomTheyBelonged) {
+    if (geteuid() != 0) GTEST_SKIP() << "only root may give files away";
+    ASSERT_EQ(chown(path_.c_str(), 12345, 54321), 0);
+    ASSERT_EQ(chmod(path_.c_str(), 0640), 0);
+    ASSERT_TRUE(replace(path_));
+    struct stat status {};
+    ASSERT_EQ(stat(path_.c_str(), &status), 0);
+    EXPECT_EQ(status.st_uid, 12345u);
+    EXPECT_EQ(status.st_gid, 54321u);
+    EXPECT_EQ(mode(), 0640u);
 }
 
 // Even for root, who may write anything.
