@@ -140,7 +140,8 @@ Expected<void> checkArguments(const CookArguments& a) {
     // A cook does without one that cannot be written; but it is made, with what is above it, before the bake.
     const auto cache = cacheOf(a);
     inputs.push_back({"--cache", cache, true});
-    for (auto above = cache.parent_path(); !above.empty() && !std::filesystem::exists(above);
+    std::error_code ignored;  // what cannot even be looked at is no output's trouble
+    for (auto above = cache.parent_path(); !above.empty() && !std::filesystem::exists(above, ignored);
          above = above.parent_path())
         inputs.push_back({"--cache", above, true});
     return checkFiles(inputs, {{"--output", a.options.pack},

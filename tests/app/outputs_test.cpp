@@ -191,6 +191,12 @@ TEST_F(Outputs, NeverTheCache) {
         EXPECT_FALSE(std::filesystem::exists(path)) << path;
 }
 
+TEST_F(Outputs, ACacheThatCannotBeIsDoneWithout) {
+    const auto result = cook("uncached.dimmer", {"--cache", file(std::string(300, 'n') + "/cache")});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, HasSubstr("cooked without a cache"));
+}
+
 TEST_F(Outputs, WhatIsReadOnlyStays) {
     const std::string kept = write("kept.dimmer", "kept");
     std::filesystem::permissions(kept, std::filesystem::perms(0444));
