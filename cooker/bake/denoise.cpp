@@ -10,12 +10,18 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr int passes = 3;             // steps of 1, 2, 4 texels
-constexpr float edge_deviations = 3;  // differences up to this many standard deviations count as noise
+constexpr int passes = 3;                                                 // steps of 1, 2, 4 texels
 constexpr std::array<float, 3> kernel = {3.0f / 8, 1.0f / 4, 1.0f / 16};  // B3 spline, by distance
 
-// The smoothing of a variance: a texel's own estimate comes from a handful of rounds and says little alone.
-constexpr int variance_reach = 1;
+// A texel counts by exp(-(d^2 / k^2) / 2) of its difference d, in standard deviations of the noise of both: of the two
+// texels, and of the means around them, whose noise is a third of that and tells gradients from noise. Where light
+// changes slowly both are small; a difference that noise does not explain is an edge, or a gradient that averaging
+// would flatten.
+constexpr float texel_deviations = 1.4f, mean_deviations = 0.5f;
+
+// Means around a texel, of its light and of its variance: its own estimate comes from a handful of rounds and says
+// little alone.
+constexpr int mean_reach = 1;
 
 // Directional light is averaged as it is stored, by the tangent frame.
 constexpr float same_frame_cos = 0.99f;
@@ -24,52 +30,10 @@ constexpr float stretch_max = 1.5f;
 // Off the plane, of the way to a neighbour: above what frames that agree curve, below a step of stairs.
 constexpr float off_plane_share = 0.25f;
 
-class LightmapFilter {
+// Which texels lie beside each other on one surface, and what they hold in common.
+class Surface {
    public:
-    LightmapFilter(const Unwrap& unwrap, const Texels& texels, const Sparse<ReceiverLight>& light, int step)
-        : unwrap_(unwrap), texels_(texels), light_(light), step_(step) {}
-
-    void filter(size_t receiver, std::vector<ReceiverLight>& row) const {
-        const auto here = light_.row(receiver);
-        row.assign(here.begin(), here.end());
-        std::vector<Sum> sums(here.size());
-        for (int dy = -2; dy <= 2; ++dy)
-            for (int dx = -2; dx <= 2; ++dx) {
-                const uint32_t other = neighbour(receiver, dx * step_, dy * step_);
-                if (other == no_index) continue;
-                const float spatial =
-                    kernel[static_cast<size_t>(std::abs(dx))] * kernel[static_cast<size_t>(std::abs(dy))];
-                addRow(here, light_.row(other), spatial, sums);
-            }
-        for (size_t i = 0; i < row.size(); ++i) {
-            if (!(sums[i].weight > 0)) continue;
-            row[i].light = sums[i].light * (1 / sums[i].weight);
-            row[i].variance = sums[i].variance / (sums[i].weight * sums[i].weight);
-        }
-    }
-
-    // Replaces each variance by the mean over the neighbours of the same term.
-    void smoothVariance(size_t receiver, std::vector<ReceiverLight>& row) const {
-        const auto here = light_.row(receiver);
-        row.assign(here.begin(), here.end());
-        std::vector<float> counts(here.size(), 1);
-        for (int dy = -variance_reach; dy <= variance_reach; ++dy)
-            for (int dx = -variance_reach; dx <= variance_reach; ++dx) {
-                const uint32_t other = neighbour(receiver, dx, dy);
-                if (other == no_index || other == receiver) continue;
-                forEachCommon(here, light_.row(other), [&](size_t i, const ReceiverLight& o) {
-                    row[i].variance += o.variance;
-                    counts[i] += 1;
-                });
-            }
-        for (size_t i = 0; i < row.size(); ++i) row[i].variance /= counts[i];
-    }
-
-   private:
-    struct Sum {
-        Gathered light;
-        float weight = 0, variance = 0;
-    };
+    Surface(const Unwrap& unwrap, const Texels& texels) : unwrap_(unwrap), texels_(texels) {}
 
     // The receiver so many texels away on the same surface; no_index where there is none.
     uint32_t neighbour(size_t receiver, int dx, int dy) const {
@@ -80,6 +44,34 @@ class LightmapFilter {
         return framesAgree(a.face, b.face) && nearInSpace(a, b, dx, dy) ? other : no_index;
     }
 
+    // visit(index in the receiver's row, entry) for the same terms of the texels around it. `counts`: how many each
+    // term then is of, its own among them.
+    void addAround(const Sparse<ReceiverLight>& light, size_t receiver, std::vector<float>& counts,
+                   auto&& visit) const {
+        const auto here = light.row(receiver);
+        counts.assign(here.size(), 1);
+        for (int dy = -mean_reach; dy <= mean_reach; ++dy)
+            for (int dx = -mean_reach; dx <= mean_reach; ++dx) {
+                const uint32_t other = neighbour(receiver, dx, dy);
+                if (other == no_index || other == receiver) continue;
+                forEachCommon(here, light.row(other), [&](size_t i, const ReceiverLight& o) {
+                    visit(i, o);
+                    counts[i] += 1;
+                });
+            }
+    }
+
+    // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
+    static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {
+        size_t j = 0;
+        for (size_t i = 0; i < here.size(); ++i) {
+            while (j < other.size() && other[j].term < here[i].term) ++j;
+            if (j == other.size()) return;
+            if (other[j].term == here[i].term) visit(i, other[j]);
+        }
+    }
+
+   private:
     bool framesAgree(uint32_t a, uint32_t b) const {
         const TangentFrame &f = unwrap_.frames[a], &g = unwrap_.frames[b];
         return glm::dot(f.normal, g.normal) > same_frame_cos && glm::dot(f.tangent, g.tangent) > same_frame_cos &&
@@ -97,32 +89,80 @@ class LightmapFilter {
                off_plane_m <= off_plane_share * std::max(glm::length(way), size_m);
     }
 
-    // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
-    static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {
-        size_t j = 0;
-        for (size_t i = 0; i < here.size(); ++i) {
-            while (j < other.size() && other[j].term < here[i].term) ++j;
-            if (j == other.size()) return;
-            if (other[j].term == here[i].term) visit(i, other[j]);
-        }
-    }
+    const Unwrap& unwrap_;
+    const Texels& texels_;
+};
 
-    static void addRow(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, float spatial,
-                       std::vector<Sum>& sums) {
-        forEachCommon(here, other, [&](size_t i, const ReceiverLight& o) {
-            const float difference = luminance(here[i].light.irradiance_lux) - luminance(o.light.irradiance_lux);
-            const float noise2 = here[i].variance + o.variance;
-            if (difference * difference > edge_deviations * edge_deviations * noise2 && &here[i] != &o) return;
-            sums[i].light += o.light * spatial;
-            sums[i].weight += spatial;
-            sums[i].variance += spatial * spatial * o.variance;
+class LightmapFilter {
+   public:
+    LightmapFilter(const Surface& surface, const Sparse<ReceiverLight>& light, int step)
+        : surface_(surface), light_(light), step_(step) {
+        means_ = Sparse<float>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
+            std::vector<float> row, counts;
+            for (size_t i = begin; i < end; ++i) {
+                row.clear();
+                for (const ReceiverLight& l : light.row(i)) row.push_back(luminance(l.light.irradiance_lux));
+                surface.addAround(light, i, counts, [&](size_t k, const ReceiverLight& o) {
+                    row[k] += luminance(o.light.irradiance_lux);
+                });
+                for (size_t k = 0; k < row.size(); ++k) row[k] /= counts[k];
+                emit(std::span<const float>(row));
+            }
         });
     }
 
-    const Unwrap& unwrap_;
-    const Texels& texels_;
+    // `row`: the receiver's, as it is in the light.
+    void filter(size_t receiver, std::vector<ReceiverLight>& row) const {
+        std::vector<Sum> sums(row.size());
+        for (int dy = -2; dy <= 2; ++dy)
+            for (int dx = -2; dx <= 2; ++dx) {
+                const uint32_t other = surface_.neighbour(receiver, dx * step_, dy * step_);
+                if (other == no_index) continue;
+                const float spatial =
+                    kernel[static_cast<size_t>(std::abs(dx))] * kernel[static_cast<size_t>(std::abs(dy))];
+                addRow(receiver, other, spatial, sums);
+            }
+        for (size_t i = 0; i < row.size(); ++i) {
+            if (!(sums[i].weight > 0)) continue;
+            row[i].light = sums[i].light * (1 / sums[i].weight);
+            row[i].variance = sums[i].variance / (sums[i].weight * sums[i].weight);
+        }
+    }
+
+   private:
+    struct Sum {
+        Gathered light;
+        float weight = 0, variance = 0;
+    };
+
+    void addRow(size_t receiver, size_t other, float spatial, std::vector<Sum>& sums) const {
+        const auto here = light_.row(receiver), there = light_.row(other);
+        const auto means_here = means_.row(receiver), means_there = means_.row(other);
+        Surface::forEachCommon(here, there, [&](size_t i, const ReceiverLight& o) {
+            float weight = spatial;
+            if (other != receiver) {
+                const float texels = luminance(here[i].light.irradiance_lux) - luminance(o.light.irradiance_lux);
+                const float means = means_here[i] - means_there[static_cast<size_t>(&o - there.data())];
+                weight *= alike(texels, means, here[i].variance + o.variance);
+            }
+            if (!(weight > 0)) return;
+            sums[i].light += o.light * weight;
+            sums[i].weight += weight;
+            sums[i].variance += weight * weight * o.variance;
+        });
+    }
+
+    // By differences of luminance, and the variance of that of single texels.
+    static float alike(float texels, float means, float variance) {
+        if (!(variance > 0)) return 0;
+        const float of_texels = texels / texel_deviations, of_means = means / mean_deviations;
+        return std::exp(-(of_texels * of_texels + of_means * of_means) / (2 * variance));
+    }
+
+    const Surface& surface_;
     const Sparse<ReceiverLight>& light_;
     int step_;
+    Sparse<float> means_;  // of the luminance around each entry of light_
 };
 
 }  // namespace
@@ -130,21 +170,26 @@ class LightmapFilter {
 Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
                               Progress& progress) {
     progress.stage("denoise", texels.size() * (passes + 1));
-    auto run = [&](auto&& filter_row) {
+    const Surface surface(unwrap, texels);
+    const auto run = [&](auto&& filter_row) {
         light = Sparse<ReceiverLight>::build(texels.size(), [&](size_t begin, size_t end, auto emit) {
             std::vector<ReceiverLight> row;
             for (size_t i = begin; i < end; ++i) {
+                const auto here = light.row(i);
+                row.assign(here.begin(), here.end());
                 filter_row(i, row);
                 emit(std::span<const ReceiverLight>(row));
             }
             progress.advance(end - begin);
         });
     };
-    run([filter = LightmapFilter(unwrap, texels, light, 1)](size_t i, auto& row) { filter.smoothVariance(i, row); });
+    run([&](size_t i, auto& row) {
+        std::vector<float> counts;
+        surface.addAround(light, i, counts, [&](size_t k, const ReceiverLight& o) { row[k].variance += o.variance; });
+        for (size_t k = 0; k < row.size(); ++k) row[k].variance /= counts[k];
+    });
     for (int pass = 0; pass < passes; ++pass)
-        run([filter = LightmapFilter(unwrap, texels, light, 1 << pass)](size_t i, auto& row) {
-            filter.filter(i, row);
-        });
+        run([filter = LightmapFilter(surface, light, 1 << pass)](size_t i, auto& row) { filter.filter(i, row); });
     return light;
 }
 
