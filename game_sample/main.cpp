@@ -2,6 +2,7 @@
 #include "balls.h"
 #include "player.h"
 
+#include <dimmer/version.h>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -43,6 +44,7 @@ void declare(CLI::App& app, Arguments& arguments) {
     app.add_flag("--validate", arguments.validate, "Run under the Vulkan validation layers; exit 1 if they complain");
     app.add_flag("--no-self-visibility", arguments.no_self_visibility,
                  "Light models by their light grids alone, without their shadows on themselves");
+    app.set_version_flag("--version", "dimmer-sample " DIMMER_VERSION);
     app.footer(
         "Example: dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");

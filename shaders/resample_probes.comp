@@ -28,9 +28,10 @@ DimmerProbe resample(vec3 point, inout uint tetrahedron) {
     vec4 weights = dimmer_probe_weights(place);
     uvec4 numbers = dimmer_tetrahedron_part(place.tetrahedron, 0u);
     DimmerProbeBlend sum = dimmer_probe_none();
-    for (int i = 0; i < 4; ++i)
-        dimmer_probe_add(sum, dimmer_probe_load(numbers[i]), vec3(weights[i] * dimmer_weight_scale(color_format)),
-                         color_format);
+    for (int i = 0; i < 4; ++i) {
+        precise float weight = weights[i] * dimmer_weight_scale(color_format);
+        dimmer_probe_add(sum, dimmer_probe_load(numbers[i]), vec3(weight), color_format);
+    }
     return dimmer_probe_encode(sum, color_format);
 }
 

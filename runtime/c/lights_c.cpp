@@ -64,7 +64,8 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
                                     .queue = vulkan->queue,
                                     .queue_family = vulkan->queue_family,
                                     .compute_queue = vulkan->compute_queue,
-                                    .compute_queue_family = vulkan->compute_queue_family};
+                                    .compute_queue_family = vulkan->compute_queue_family,
+                                    .get_instance_proc_addr = vulkan->get_instance_proc_addr};
         RuntimeOptions options;
         options.buffering = buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace;
         options.moving_probes_max = moving_probes_max;

@@ -39,9 +39,11 @@ void blendBatch(const WorkItem& item, std::span<const WorkTerm> terms, const Pac
     std::array<TexelRecord, batch_receivers_max> records;
     for (uint32_t i = 0; i < batch.receiver_count; ++i) {
         texels[i] = texelIndex(data, data.addresses[batch.first_receiver + i]);
+#ifdef __GNUC__
         // Rows of a page are kilobytes apart, which no hardware foresees: by the time of the stores they are here.
         __builtin_prefetch(pages.irradiance + texels[i], 1);
         __builtin_prefetch(pages.direction + texels[i], 1);
+#endif
         records[i] = pages.base[batch.first_receiver + i];
     }
     if (terms.empty()) {  // the page shows the base as cooked
@@ -118,7 +120,8 @@ CpuRuntime::CpuRuntime(CpuRuntime&&) noexcept = default;
 CpuRuntime& CpuRuntime::operator=(CpuRuntime&&) noexcept = default;
 
 // No two items write the same receiver, so it does not matter who takes which.
-void CpuRuntime::forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend) {
+template <class Blend>
+void CpuRuntime::forItems(const WorkList& work, const Blend& blend) {
     if (!pool_ || work.items.size() < batches_per_thread_min * pool_->threads()) return blend(work.items);
     std::atomic<size_t> next = 0;
     pool_->run([&](uint32_t) {

@@ -22,10 +22,10 @@ WorkerPool::~WorkerPool() {
     for (std::thread& worker : workers_) worker.join();
 }
 
-void WorkerPool::run(const std::function<void(uint32_t)>& work) {
+void WorkerPool::runCall(Call work) {
     {
         const std::scoped_lock lock(mutex_);
-        work_ = &work;
+        work_ = work;
         running_ = static_cast<uint32_t>(workers_.size());
         ++round_;
     }
@@ -38,7 +38,7 @@ void WorkerPool::run(const std::function<void(uint32_t)>& work) {
 void WorkerPool::loop(uint32_t index) {
     uint64_t done = 0;
     for (;;) {
-        const std::function<void(uint32_t)>* work = nullptr;
+        Call work;
         {
             std::unique_lock lock(mutex_);
             begin_.wait(lock, [&] { return stop_ || round_ != done; });
@@ -46,7 +46,7 @@ void WorkerPool::loop(uint32_t index) {
             done = round_;
             work = work_;
         }
-        (*work)(index);
+        work(index);
         const std::scoped_lock lock(mutex_);
         if (--running_ == 0) end_.notify_one();
     }

@@ -3,7 +3,6 @@
 
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -19,15 +18,26 @@ class WorkerPool {
     WorkerPool& operator=(const WorkerPool&) = delete;
 
     uint32_t threads() const { return static_cast<uint32_t>(workers_.size()) + 1; }
-    // Calls work(i) once for every i below threads(), on as many threads; returns when all have returned.
-    void run(const std::function<void(uint32_t)>& work);
+    // Calls work(i) once for every i below threads(), on as many threads; returns when all have returned. Allocates
+    // nothing.
+    template <class Work>
+    void run(const Work& work) {
+        runCall({[](const void* callee, uint32_t index) { (*static_cast<const Work*>(callee))(index); }, &work});
+    }
 
    private:
+    // A call of something that outlives it: std::function would take memory for more than two captures.
+    struct Call {
+        void (*function)(const void* callee, uint32_t index) = nullptr;
+        const void* callee = nullptr;
+        void operator()(uint32_t index) const { function(callee, index); }
+    };
+    void runCall(Call work);
     void loop(uint32_t index);
 
     std::mutex mutex_;
     std::condition_variable begin_, end_;
-    const std::function<void(uint32_t)>* work_ = nullptr;
+    Call work_;
     uint64_t round_ = 0;
     uint32_t running_ = 0;
     bool stop_ = false;

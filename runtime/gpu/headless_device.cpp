@@ -3,6 +3,7 @@
 #include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <gpu/vulkan_functions.h>
 
 #include <algorithm>
 #include <mutex>
@@ -37,7 +38,15 @@ VkDebugUtilsMessengerCreateInfoEXT messengerInfo(MessageLog& log) {
     return info;
 }
 
+// Of the linked loader. `instance`: null for the functions that need none yet.
+template <class Function>
+Function loaderFunction(VkInstance instance, const char* name) {
+    return reinterpret_cast<Function>(linkedLoader()(instance, name));
+}
+
 bool layerInstalled(const char* name) {
+    const auto vkEnumerateInstanceLayerProperties =
+        loaderFunction<PFN_vkEnumerateInstanceLayerProperties>(VK_NULL_HANDLE, "vkEnumerateInstanceLayerProperties");
     uint32_t count = 0;
     vkEnumerateInstanceLayerProperties(&count, nullptr);
     std::vector<VkLayerProperties> layers(count);
@@ -96,6 +105,7 @@ int preference(VkPhysicalDeviceType type) {
 
 struct HeadlessDevice::Impl {
     MessageLog log;  // before the instance: its messenger writes here to the very end
+    VulkanFunctions functions;
     VulkanContext vulkan;
     VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
     std::string name, driver;
@@ -103,11 +113,12 @@ struct HeadlessDevice::Impl {
     ~Impl() {
         if (vulkan.device) vkDestroyDevice(vulkan.device, nullptr);
         if (messenger) {
-            const auto destroy = reinterpret_cast<PFN_vkDestroyDebugUtilsMessengerEXT>(
-                vkGetInstanceProcAddr(vulkan.instance, "vkDestroyDebugUtilsMessengerEXT"));
+            const auto destroy =
+                loaderFunction<PFN_vkDestroyDebugUtilsMessengerEXT>(vulkan.instance, "vkDestroyDebugUtilsMessengerEXT");
             destroy(vulkan.instance, messenger, nullptr);
         }
-        if (vulkan.instance) vkDestroyInstance(vulkan.instance, nullptr);
+        if (vulkan.instance)
+            loaderFunction<PFN_vkDestroyInstance>(vulkan.instance, "vkDestroyInstance")(vulkan.instance, nullptr);
     }
 
     Expected<void> createInstance(bool validation);
@@ -142,11 +153,15 @@ Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
         info.enabledExtensionCount = 1;
         info.ppEnabledExtensionNames = extensions;
     }
+    const auto vkCreateInstance = loaderFunction<PFN_vkCreateInstance>(VK_NULL_HANDLE, "vkCreateInstance");
     DIMMER_VK(vkCreateInstance, &info, nullptr, &vulkan.instance);
+    auto loaded = VulkanFunctions::load(nullptr, vulkan.instance);
+    if (!loaded) return std::unexpected(std::move(loaded.error()));
+    functions = std::move(*loaded);
 
     if (validation) {
-        const auto create = reinterpret_cast<PFN_vkCreateDebugUtilsMessengerEXT>(
-            vkGetInstanceProcAddr(vulkan.instance, "vkCreateDebugUtilsMessengerEXT"));
+        const auto create =
+            loaderFunction<PFN_vkCreateDebugUtilsMessengerEXT>(vulkan.instance, "vkCreateDebugUtilsMessengerEXT");
         const VkDebugUtilsMessengerCreateInfoEXT messenger_info = messengerInfo(log);
         DIMMER_VK(create, vulkan.instance, &messenger_info, nullptr, &messenger);
     }

@@ -1,5 +1,6 @@
 #include <gpu/memory.h>
 
+#include <fmt/format.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -30,7 +31,23 @@ std::array<VkMemoryPropertyFlags, 2> wanted(MemoryUse use) {
     return {host, host};
 }
 
+VkDeviceSize allocationBytesMax(VkPhysicalDevice device) {
+    auto allocations =
+        vkStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+    auto properties =
+        vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
+    vkGetPhysicalDeviceProperties2(device, &properties);
+    return allocations.maxMemoryAllocationSize;
+}
+
 Expected<MemoryHandle> allocate(const VulkanContext& vulkan, const VkMemoryRequirements& requirements, MemoryUse use) {
+    const VkDeviceSize bytes_max = allocationBytesMax(vulkan.physical_device);
+    if (requirements.size > bytes_max)
+        return fail(ErrorCode::Unsupported,
+                    fmt::format("A buffer or image of the runtime's needs {} bytes of memory, and the Vulkan device "
+                                "allocates {} bytes at most. Cook with fewer texels per metre or wider light grids, or "
+                                "ask for fewer moving probes.",
+                                requirements.size, bytes_max));
     VkPhysicalDeviceMemoryProperties properties;
     vkGetPhysicalDeviceMemoryProperties(vulkan.physical_device, &properties);
     std::optional<uint32_t> type;

@@ -27,7 +27,8 @@ enum class MemoryUse {
     Readback,  // written by the GPU, read by the host
 };
 
-// Both may be used on the context's queue and on its compute queue.
+// Both may be used on the context's queue and on its compute queue. Unsupported: larger than the device allocates at a
+// time.
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
                                  MemoryUse memory);
 Expected<GpuImage> createImage(const VulkanContext& vulkan, VkImageCreateInfo info);

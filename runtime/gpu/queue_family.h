@@ -4,7 +4,7 @@
 #include <dimmer/error.h>
 
 #include <fmt/format.h>
-#include <vulkan/vulkan.h>
+#include <gpu/vulkan_functions.h>
 
 #include <span>
 #include <string_view>

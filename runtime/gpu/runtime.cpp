@@ -11,6 +11,7 @@
 #include <gpu/update_timer.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <gpu/vulkan_functions.h>
 #include <probes/model_slots.h>
 
 #include <algorithm>
@@ -25,11 +26,14 @@ double microsecondsSince(std::chrono::steady_clock::time_point start) {
     return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start).count();
 }
 
-Expected<void> checkContext(const VulkanContext& vulkan) {
-    if (!vulkan.instance || !vulkan.physical_device || !vulkan.device || !vulkan.queue)
-        return fail(ErrorCode::InvalidArgument,
-                    "The VulkanContext has a null handle; instance, physical device, device "
-                    "and queue are all needed.");
+Expected<void> checkHandles(const VulkanContext& vulkan) {
+    if (vulkan.instance && vulkan.physical_device && vulkan.device && vulkan.queue) return {};
+    return fail(ErrorCode::InvalidArgument,
+                "The VulkanContext has a null handle; instance, physical device, device "
+                "and queue are all needed.");
+}
+
+Expected<void> checkDevice(const VulkanContext& vulkan) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     if (properties.apiVersion < VK_API_VERSION_1_2)
@@ -71,6 +75,7 @@ void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
 
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
 struct Runtime::Impl {
+    VulkanFunctions functions;  // first: every other member calls them to its end
     VulkanContext vulkan;
     std::vector<LightmapPages> pages;  // one set, or two that take turns
     uint32_t page_sets = 1;            // as asked for
@@ -255,8 +260,12 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
 }
 
 Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options) {
-    DIMMER_TRY(checkContext(vulkan));
+    DIMMER_TRY(checkHandles(vulkan));
+    auto functions = VulkanFunctions::load(vulkan.get_instance_proc_addr, vulkan.instance);
+    if (!functions) return std::unexpected(std::move(functions.error()));
+    DIMMER_TRY(checkDevice(vulkan));
     auto impl = std::make_unique<Impl>();
+    impl->functions = std::move(*functions);
     impl->vulkan = vulkan;
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
     impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
@@ -283,6 +292,7 @@ void Runtime::planTexels(UpdateStats& stats) {
     Planner& next = planner(impl.target);
     if (!in_place && planner(impl.front).upToDate()) {
         next.startOver();  // a state that was called back while half of it was written is never shown
+        stats = planner(impl.front).stats();  // what is put off
         return;
     }
     if (!in_place && next.mayGoOn()) {

@@ -1,7 +1,7 @@
 // Vulkan's input structures, zeroed but for their type, and what is short to say with them.
 #pragma once
 
-#include <vulkan/vulkan.h>
+#include <gpu/vulkan_functions.h>
 
 namespace dimmer {
 

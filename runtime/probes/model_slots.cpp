@@ -43,7 +43,13 @@ double determinant(const Transform& t) {
            m(0, 2) * (m(1, 0) * m(2, 1) - m(1, 1) * m(2, 0));
 }
 
-// Of a transform whose determinant is not 0. Cramer's rule.
+// Infinite beyond the floats, where a cast would be anything.
+float toFloat(double value) {
+    constexpr double largest = std::numeric_limits<float>::max();
+    return std::abs(value) <= largest ? static_cast<float>(value) : infinite;
+}
+
+// Of a transform whose determinant is not 0. Cramer's rule. Numbers beyond the floats are infinite.
 Transform inverse(const Transform& t) {
     const auto m = [&](size_t i, size_t j) { return static_cast<double>(t.rows[i % 3][j % 3]); };
     const double scale = 1 / determinant(t);
@@ -52,12 +58,17 @@ Transform inverse(const Transform& t) {
         double moved = 0;
         for (size_t j = 0; j < 3; ++j) {
             const double entry = scale * (m(j + 1, i + 1) * m(j + 2, i + 2) - m(j + 1, i + 2) * m(j + 2, i + 1));
-            out.rows[i][j] = static_cast<float>(entry);
+            out.rows[i][j] = toFloat(entry);
             moved -= entry * static_cast<double>(t.rows[j][3]);
         }
-        out.rows[i][3] = static_cast<float>(moved);
+        out.rows[i][3] = toFloat(moved);
     }
     return out;
+}
+
+// An axis too short for floats to tell its places apart is as good as flat: all of it is probe 0.
+void flattenUnlessFinite(std::array<float, 4>& row) {
+    if (!std::ranges::all_of(row, [](float v) { return std::isfinite(v); })) row = {};
 }
 
 Expected<void> check(const ModelGrid& grid) {
@@ -148,7 +159,7 @@ ModelSlot slotOf(const LocalGrid& grid) {
                 row[3] -= row[i] * grid.origin_m[i];
             }
         }
-        if (!std::ranges::all_of(row, [](float v) { return std::isfinite(v); })) row = {};
+        flattenUnlessFinite(row);
     }
     return slot;
 }
@@ -186,13 +197,13 @@ void countResampled(std::span<const ResampleItem> items, UpdateStats& stats) {
 
 ModelSlots::ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_sets)
     : first_probe_(static_cast<uint32_t>(data.probes.base.size())),
-      probes_max_((std::min(probes_max, moving_probes_limit) + probes_granule - 1) / probes_granule * probes_granule),
       page_sets_(page_sets),
       has_grid_(!data.probes.global.empty()),
+      probes_max_(has_grid_ ? inGranules(std::min(probes_max, moving_probes_limit)) * probes_granule : 0),
       grid_box_{data.probes.global.start.min_m, data.probes.global.start.max_m},
       pool_(probes_max_ / probes_granule),
       dirty_counts_(page_sets) {
-    if (probes_max == 0) return;
+    if (probes_max_ == 0) return;
     cluster_boxes_ = boxesOfClusters(data);
     changed_.reserve(cluster_boxes_.size());
     slots_.reserve(itemsMax());
@@ -266,6 +277,7 @@ Expected<ModelSlot> ModelSlots::slot(Model model) const {
         if (!(step > 0)) continue;  // a flat axis: all of it is probe 0
         for (size_t j = 0; j < 4; ++j) out.grid_from_world[i][j] = model_from_world.rows[i][j] / step;
         out.grid_from_world[i][3] -= firstAlong(slot.grid, i) / step;
+        flattenUnlessFinite(out.grid_from_world[i]);
     }
     return out;
 }

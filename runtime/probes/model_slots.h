@@ -35,7 +35,8 @@ void countResampled(std::span<const ResampleItem> items, UpdateStats& stats);
 
 class ModelSlots {
    public:
-    // Numbers of moving probes begin behind the pack's own. Reserves for the worst case.
+    // Numbers of moving probes begin behind the pack's own. Reserves for the worst case; nothing where the pack has no
+    // global grid, as no model can be added.
     ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_sets);
 
     Expected<Model> add(const ModelGrid& grid, const Transform& transform);
@@ -70,10 +71,12 @@ class ModelSlots {
     Expected<uint32_t> find(Model model) const;
     void place(Slot& slot, const Transform& transform);
     void mark(Slot& slot, uint32_t sets);
-    uint32_t granules(const ModelGrid& grid) const { return (grid.probeCount() + probes_granule - 1) / probes_granule; }
+    static uint32_t inGranules(uint32_t probes) { return (probes + probes_granule - 1) / probes_granule; }
+    static uint32_t granules(const ModelGrid& grid) { return inGranules(grid.probeCount()); }
 
-    uint32_t first_probe_ = 0, probes_max_ = 0, page_sets_ = 1, model_count_ = 0;
+    uint32_t first_probe_ = 0, page_sets_ = 1;
     bool has_grid_ = false;
+    uint32_t probes_max_ = 0, model_count_ = 0;
     Box grid_box_;     // places outside have the light of its nearest point
     RecordPool pool_;  // of granules
     std::vector<Slot> slots_;

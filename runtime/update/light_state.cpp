@@ -44,10 +44,11 @@ Expected<uint32_t> lookUp(std::span<const Element> elements, ElementKind kind, s
 
 Expected<void> checkHandle(std::span<const Element> elements, ElementKind kind, uint32_t index) {
     if (index < elements.size() && elements[index].kind == kind) return {};
+    const std::string what =
+        index == LightSet().element ? "A handle that was never looked up" : fmt::format("Element {}", index);
     return fail(ErrorCode::InvalidArgument,
-                fmt::format("Element {} is no {} of this pack; handles come from a look-up on a runtime of the same "
-                            "pack.",
-                            index, kindName(kind)));
+                fmt::format("{} is no {} of this pack; handles come from a look-up on a runtime of the same pack.",
+                            what, kindName(kind)));
 }
 
 bool inRange(float value, float max) {

@@ -86,26 +86,56 @@ Weight Planner::product(const Contribution& contribution) const {
     return {bounded(dim.r), bounded(dim.g), bounded(dim.b)};
 }
 
-bool Planner::upToDate() const {
-    const auto unchanged = [&](uint32_t k) { return product(data_.contributions[k]) == planned_[k]; };
-    return waiting_clusters_.empty() && !recheck_ && std::ranges::all_of(dirty_contributions_, unchanged) &&
-           std::ranges::all_of(dirty_elements_, [&](uint32_t element) {
-               return std::ranges::all_of(tables_->contributions_of_element[element], unchanged);
-           });
-}
-
-void Planner::collectChanges() {
+// Of contributions alone, and of those alone whose weight is another one now.
+void Planner::gatherDirty() {
     for (uint32_t element : dirty_elements_) {
         element_is_dirty_[element] = false;
         for (uint32_t k : tables_->contributions_of_element[element]) markDirty(k);
     }
     dirty_elements_.clear();
+    std::erase_if(dirty_contributions_, [&](uint32_t k) {
+        contribution_is_dirty_[k] = product(data_.contributions[k]) != planned_[k];
+        return !contribution_is_dirty_[k];
+    });
+}
+
+bool Planner::upToDate() {
+    stats_ = {};
+    if (!waiting_clusters_.empty() || recheck_) return false;
+    gatherDirty();
+    return dirty_contributions_.empty() || (limits_.tolerance_quanta > 0 && allWithinTolerance());
+}
+
+// Whether every change may be put off; then all are, otherwise it is as if nobody had asked. Only where nothing waits.
+bool Planner::allWithinTolerance() {
+    changes_.clear();
+    for (uint32_t k : dirty_contributions_)
+        changes_.push_back({k, std::exchange(planned_[k], product(data_.contributions[k]))});
+    for (const Change& change : changes_)
+        for (const Holder& holder : tables_->holders_of_contribution[change.contribution]) mark(holder.cluster);
+    uint32_t clusters = 0;
+    bool beyond = false;
+    visitMarked([&](uint32_t cluster) {
+        ++clusters;
+        beyond = beyond || quantaPutOff(receivers_.clusters[cluster]) > limits_.tolerance_quanta;
+    });
+    if (beyond) {
+        for (const Change& change : changes_) planned_[change.contribution] = change.before;
+        changes_.clear();
+        return false;
+    }
+    for (uint32_t k : dirty_contributions_) contribution_is_dirty_[k] = false;
+    dirty_contributions_.clear();
+    stats_.contributions_changed = static_cast<uint32_t>(changes_.size());
+    stats_.clusters_put_off = clusters;
+    return true;
+}
+
+void Planner::collectChanges() {
+    gatherDirty();
     for (uint32_t k : dirty_contributions_) {
         contribution_is_dirty_[k] = false;
-        const Weight weight = product(data_.contributions[k]);
-        if (weight == planned_[k]) continue;
-        changes_.push_back({k, planned_[k]});
-        planned_[k] = weight;
+        changes_.push_back({k, std::exchange(planned_[k], product(data_.contributions[k]))});
     }
     dirty_contributions_.clear();
     for (const Change& change : changes_) touch(change);

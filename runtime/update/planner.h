@@ -75,8 +75,11 @@ class Planner {
 
     // Whether batches wait, as the last plan was limited.
     bool waiting() const { return !waiting_clusters_.empty(); }
-    // Whether plan() has nothing to do, by the weights.
-    bool upToDate() const;
+    // Whether plan() has nothing to do: the pages hold what the weights say, or are within the tolerance of it. What is
+    // put off for that is counted in stats(), as by plan(). Constant time after a yes, until a weight is set.
+    bool upToDate();
+    // Elements and contributions that the next upToDate() or plan() looks at: those that may have changed.
+    size_t suspects() const { return dirty_elements_.size() + dirty_contributions_.size(); }
 
     const WorkList& work() const { return work_; }
     // As the last plan() left it; 0 is off.
@@ -115,6 +118,8 @@ class Planner {
 
     Weight product(const Contribution& contribution) const;
     void markDirty(uint32_t contribution);
+    void gatherDirty();
+    bool allWithinTolerance();
     void collectChanges();
     void touch(const Change& change);
     void touchMarked();

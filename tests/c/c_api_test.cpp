@@ -86,6 +86,12 @@ TEST(CInterface, TheExampleOfTheDocumentation) {
 
 using CInterfaceGpu = GpuTest;
 
+uint32_t functions_asked_for = 0;
+VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL countingLoader(VkInstance instance, const char* name) {
+    ++functions_asked_for;
+    return vkGetInstanceProcAddr(instance, name);
+}
+
 TEST_F(CInterfaceGpu, BlendsByVulkan) {
     const VulkanContext context = device().context();
     const dimmer_vulkan vulkan{.instance = context.instance,
@@ -94,11 +100,13 @@ TEST_F(CInterfaceGpu, BlendsByVulkan) {
                                .queue = context.queue,
                                .queue_family = context.queue_family,
                                .compute_queue = VK_NULL_HANDLE,
-                               .compute_queue_family = 0};
+                               .compute_queue_family = 0,
+                               .get_instance_proc_addr = countingLoader};
     BlendedPages pages;
     ASSERT_EQ(
         blend_on_vulkan(PackOnDisk().path.c_str(), &vulkan, pages.irradiance.data(), pages.direction.data(), 2048), 0)
         << problem;
+    EXPECT_GT(functions_asked_for, 0u);
     const BlendedPages expected = expectedPages();
     EXPECT_EQ(pages.irradiance, expected.irradiance);
     EXPECT_EQ(pages.direction, expected.direction);

@@ -11,9 +11,28 @@
 #include <fstream>
 #include <glm/gtc/packing.hpp>
 #include <numbers>
+#include <stdexcept>
 
 namespace dimmer::sample {
 namespace {
+
+// Draws: a machine without any device has nothing to draw with.
+class DrawingTest : public testing::Test {
+   protected:
+    void SetUp() override {
+        const auto any = HeadlessDevice::create({.graphics = true});
+        if (!any) GTEST_SKIP() << "no Vulkan device: " << any.error().message;
+    }
+};
+using SampleLevelRenderer = DrawingTest;
+using SamplePlayer = DrawingTest;
+
+// What is there, or the end of the test.
+template <class T>
+T need(Expected<T> made) {
+    if (!made) throw std::runtime_error(made.error().message);
+    return std::move(*made);
+}
 
 constexpr float irradiance_lux = 48, exposure = 0.25f;  // 12 as stored: exact in 11 and 10 bits
 
@@ -59,24 +78,23 @@ PackData wall(bool faces_viewer) {
 // `frame_number`.
 glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script = {}, uint32_t frame_number = 0,
                       bool self_visibility = true) {
-    const auto pack = Pack::fromData(data);
-    EXPECT_TRUE(pack);
-    const auto device = HeadlessDevice::create({.validation = true, .graphics = true});
-    EXPECT_TRUE(device) << device.error().message;
-    const VulkanContext vulkan = device->context();
+    const Pack pack = need(Pack::fromData(data));
+    const HeadlessDevice device = need(HeadlessDevice::create({.validation = true, .graphics = true}));
+    const VulkanContext vulkan = device.context();
     glm::vec3 middle{-1};
     {
-        auto lights = Runtime::create(vulkan, *pack, {.moving_probes_max = movingProbes(script) + movingProbes(*pack)});
-        EXPECT_TRUE(lights && lights->setWeight(*lights->lightSet("lamp"), weight));
-        auto renderer = LevelRenderer::create(vulkan, *pack, lights->images(), {16, 8});
-        EXPECT_TRUE(renderer);
-        auto models = ModelRenderer::create(vulkan, *lights, renderer->renderPass(), {16, 8}, self_visibility);
-        EXPECT_TRUE(models && models->move(0, *lights));
-        auto balls = Balls::create(script, *lights);
-        EXPECT_TRUE(balls && balls->move(frame_number, *lights));
+        Runtime lights =
+            need(Runtime::create(vulkan, pack, {.moving_probes_max = movingProbes(script) + movingProbes(pack)}));
+        EXPECT_TRUE(lights.setWeight(need(lights.lightSet("lamp")), weight));
+        LevelRenderer renderer = need(LevelRenderer::create(vulkan, pack, lights.images(), {16, 8}));
+        ModelRenderer models =
+            need(ModelRenderer::create(vulkan, lights, renderer.renderPass(), {16, 8}, self_visibility));
+        EXPECT_TRUE(models.move(0, lights));
+        Balls balls = need(Balls::create(script, lights));
+        EXPECT_TRUE(balls.move(frame_number, lights));
         std::optional<SphereRenderer> spheres;
         if (!script.balls.empty())
-            spheres.emplace(*SphereRenderer::create(vulkan, *lights, renderer->renderPass(), {16, 8}, 8));
+            spheres.emplace(need(SphereRenderer::create(vulkan, lights, renderer.renderPass(), {16, 8}, 8)));
 
         VkCommandPoolCreateInfo pool_info{VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, nullptr, 0, vulkan.queue_family};
         VkCommandPool pool = VK_NULL_HANDLE;
@@ -87,23 +105,23 @@ glm::vec3 middlePixel(const PackData& data, Weight weight, const Script& script 
         vkAllocateCommandBuffers(vulkan.device, &allocate, &commands);
         VkCommandBufferBeginInfo begin{VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, nullptr, 0, nullptr};
         vkBeginCommandBuffer(commands, &begin);
-        EXPECT_TRUE(lights->record(commands));
-        renderer->record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, *lights,
-                         [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
-                             EXPECT_TRUE(models->draw(pass, clip_from_world, *lights));
-                             if (spheres) spheres->draw(pass, clip_from_world, *balls->spheres(*lights));
-                         });
+        EXPECT_TRUE(lights.record(commands));
+        renderer.record(commands, {{0, 0, 0}, {0, 0, -1}, 1.0f}, {3, 2, 1}, lights,
+                        [&](VkCommandBuffer pass, const glm::mat4& clip_from_world) {
+                            EXPECT_TRUE(models.draw(pass, clip_from_world, lights));
+                            if (spheres) spheres->draw(pass, clip_from_world, need(balls.spheres(lights)));
+                        });
         vkEndCommandBuffer(commands);
         VkSubmitInfo submit{VK_STRUCTURE_TYPE_SUBMIT_INFO, nullptr, 0, nullptr, nullptr, 1, &commands, 0, nullptr};
         vkQueueSubmit(vulkan.queue, 1, &submit, VK_NULL_HANDLE);
         vkQueueWaitIdle(vulkan.queue);
 
-        const RadianceFrame frame = renderer->read();
+        const RadianceFrame frame = renderer.read();
         const uint16_t* pixel = &frame.rgba[(4 * 16 + 8) * 4];
         middle = {glm::unpackHalf1x16(pixel[0]), glm::unpackHalf1x16(pixel[1]), glm::unpackHalf1x16(pixel[2])};
         vkDestroyCommandPool(vulkan.device, pool, nullptr);
     }
-    for (const std::string& message : device->validationMessages()) ADD_FAILURE() << message;
+    for (const std::string& message : device.validationMessages()) ADD_FAILURE() << message;
     return middle;
 }
 
@@ -113,14 +131,14 @@ void expectRadiance(const glm::vec3& pixel, const glm::vec3& expected) {
         EXPECT_NEAR(pixel[channel], expected[channel], expected[channel] * 0x1p-10f) << channel;
 }
 
-TEST(SampleLevelRenderer, RadianceIsReflectedAndEmittedLight) {
+TEST_F(SampleLevelRenderer, RadianceIsReflectedAndEmittedLight) {
     constexpr float e_pi = irradiance_lux / std::numbers::pi_v<float>;
     expectRadiance(middlePixel(wall(true), 1), {0.5f * e_pi, 0.25f * e_pi + 8, 0.75f * e_pi});
 }
 
 // Light of 40 lux from all sides (radiance 40 / pi, L_00 = sqrt(4 pi) times that): a ball of 0.75 in it has 0.75 * 40 /
 // pi all over; once it has flown away the wall shows.
-TEST(SampleLevelRenderer, ABallIsLitByTheLightGridWhereItIs) {
+TEST_F(SampleLevelRenderer, ABallIsLitByTheLightGridWhereItIs) {
     constexpr float ball_lux = 40, pi = std::numbers::pi_v<float>;
     PackData data = wall(true);
     std::vector<glm::vec3> points = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, -2}};
@@ -161,7 +179,7 @@ TEST(SampleBalls, OneFliesAtEachOfTheLevelsPlaces) {
 
 // A plate 1 m in front of the viewer in 40 lux from all sides, of which its vertices see half. It stands, or it moves
 // and takes the same light from the global grid; drawn by one path.
-TEST(SampleLevelRenderer, AModelIsLitByItsGridAndShadowsItself) {
+TEST_F(SampleLevelRenderer, AModelIsLitByItsGridAndShadowsItself) {
     constexpr float plate_lux = 40, pi = std::numbers::pi_v<float>;
     const float stored = std::sqrt(4 * pi) * plate_lux / pi * exposure;
     for (const bool moves : {false, true}) {
@@ -208,16 +226,16 @@ TEST(SampleLevelRenderer, AModelIsLitByItsGridAndShadowsItself) {
     }
 }
 
-TEST(SampleLevelRenderer, EmissionFollowsItsSet) {
+TEST_F(SampleLevelRenderer, EmissionFollowsItsSet) {
     constexpr float e_pi = irradiance_lux / std::numbers::pi_v<float>;
     expectRadiance(middlePixel(wall(true), Weight(1, 0.5f, 0)), {0.5f * e_pi, 0.5f * (0.25f * e_pi + 8), 0});
 }
 
-TEST(SampleLevelRenderer, BackFacesShowWhatIsBehind) {
+TEST_F(SampleLevelRenderer, BackFacesShowWhatIsBehind) {
     expectRadiance(middlePixel(wall(false), 1), {3, 2, 1});
 }
 
-TEST(SamplePlayer, WritesPicturesAndCosts) {
+TEST_F(SamplePlayer, WritesPicturesAndCosts) {
     const auto pack = Pack::fromData(wall(true));
     ASSERT_TRUE(pack);
     const auto script = parseScript("size 16 8\nframes 4\ncamera 0 0 0 look 0 0 -1\nat 2 set lamp=0.5", "test", *pack);

@@ -95,6 +95,8 @@ const ContentFault content_faults[] = {
     {"header: no pages", [](PackFile& f) { f.header.page_count = 0; }, "0 pages"},
     {"header: huge pages", [](PackFile& f) { f.header.page_width = UINT32_MAX; }, "pages of 4294967295"},
     {"header: other pages", [](PackFile& f) { f.header.page_height = 31; }, "BASE states 16384 bytes instead of 15872"},
+    {"header: colour", [](PackFile& f) { f.header.color_format = 2; }, "its colour format 2 is unknown"},
+    {"header: direction", [](PackFile& f) { f.header.direction_model = 2; }, "its directional model 2 is unknown"},
     {"header: NaN", [](PackFile& f) { f.header.exposure = NAN; }, "its exposure is nan"},
 };
 

@@ -54,6 +54,8 @@ void expectEqual(const ModelMesh& a, const ModelMesh& b) {
 
 void expectEqual(const PackData& a, const PackData& b) {
     EXPECT_EQ(a.exposure, b.exposure);
+    EXPECT_EQ(a.color_format, b.color_format);
+    EXPECT_EQ(a.direction_model, b.direction_model);
     EXPECT_EQ(a.page_width, b.page_width);
     EXPECT_EQ(a.page_height, b.page_height);
     EXPECT_EQ(a.page_count, b.page_count);
@@ -109,6 +111,20 @@ void expectRoundTrip(const PackData& data) {
 
 TEST(PackRoundTrip, EveryField) {
     for (uint32_t seed = 1; seed <= 5; ++seed) expectRoundTrip(samplePack(seed));
+}
+
+TEST(PackRoundTrip, EveryFormatOfPages) {
+    for (const ColorFormat color : {ColorFormat::R11G11B10F, ColorFormat::E5B9G9R9})
+        for (const DirectionModel model : {DirectionModel::Ahd, DirectionModel::Linear}) {
+            PackData data = samplePack();
+            data.color_format = color;
+            data.direction_model = model;
+            expectRoundTrip(data);
+            // As docs/format.md numbers them.
+            const auto bytes = packBytes(data);
+            EXPECT_EQ(at<uint32_t>(bytes, 52), color == ColorFormat::E5B9G9R9 ? 1u : 0u);
+            EXPECT_EQ(at<uint32_t>(bytes, 56), model == DirectionModel::Linear ? 1u : 0u);
+        }
 }
 
 TEST(PackRoundTrip, ThroughAFile) {

@@ -2,7 +2,7 @@
 #include <bake/baked_scene.h>
 #include <bake/test_scenes.h>
 #include <gtest/gtest.h>
-#include <pipeline/cook.h>
+#include <pipeline/cook_settings.h>
 #include <pipeline/small_level.h>
 #include <probes/placement.h>
 #include <probes/spherical_harmonics.h>

@@ -3,6 +3,7 @@
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
 
+#include <format/texel.h>
 #include <gpu/transfer.h>
 
 #include "gpu_fixture.h"
@@ -115,6 +116,56 @@ TEST_F(AsyncTest, ASecondSetOfPagesKeepsTheOldLightMeanwhile) {
     CpuRuntime cpu(pack);
     cpu.update();
     expectEqualPages(gpu, cpu);
+}
+
+// A weight of 1 is 100 steps of the format, by which the tolerance counts. What is shown goes on being shown while it
+// is within the tolerance: the other pages, as old as the last but one state, may be within it too, and no better.
+TEST_F(AsyncTest, WithinTheToleranceTheSamePagesAreShown) {
+    PackData data = test::emptyPack(1, 0);
+    data.page_count = 1;
+    data.page_width = data.page_height = 8;
+    test::Random random(77);
+    const test::ClusterPlan plans[] = {{{0}, 64}};
+    test::fillPack(data, plans, random);
+    constexpr uint32_t none = 1023u | 512u << 10 | 512u << 20;
+    // Of a base of 1 the step is 1/64 in red and green, and 1/32 in blue.
+    for (TexelRecord& record : data.base_pages) record = {encodeR11G11B10(1, 1, 1), none};
+    for (TexelRecord& record : data.payload) record = {encodeR11G11B10(100 / 64.0f, 100 / 64.0f, 100 / 64.0f), none};
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.setLimits({.tolerance_quanta = 4}));
+    struct Step {
+        float weight;
+        bool shows;  // further than 4 steps from what was shown last
+    };
+    constexpr Step steps[] = {
+        {.50f, true},   {.53f, false},  {.531f, false}, {.532f, false}, {.47f, false}, {.545f, true}, {.515f, false},
+        {.520f, false}, {.519f, false}, {.521f, false}, {.50f, true},   {.53f, false}, {.545f, true},
+    };
+    CpuRuntime shown(pack);
+    for (const Step& step : steps) {
+        SCOPED_TRACE(step.weight);
+        const uint32_t before = gpu.pageSet();
+        ASSERT_TRUE(gpu.setWeight(LightSet{0}, step.weight));
+        const auto sent = gpu.submit();
+        ASSERT_TRUE(sent);
+        EXPECT_EQ(gpu.pageSet() != before, step.shows);
+        if (!step.shows) {
+            EXPECT_EQ(sent->clusters_put_off, 1u);
+        }
+        for (int idle = 0; idle < 3; ++idle) {
+            EXPECT_EQ(gpu.submit()->dispatches, 0u);
+            EXPECT_EQ(gpu.pageSet() != before, step.shows);
+        }
+        if (step.shows) {
+            ASSERT_TRUE(shown.setWeight(LightSet{0}, step.weight));
+        }
+        shown.update();
+        expectEqualPages(gpu, shown);
+    }
+    ASSERT_TRUE(gpu.setWeight(LightSet{0}, .53f) && gpu.setLimits({}));
+    ASSERT_TRUE(gpu.submit());
+    expectFreshPages(gpu);
 }
 
 TEST_F(AsyncTest, ModesThatWriteEverythingHaveOneSetOfPages) {
@@ -407,9 +458,14 @@ TEST_F(AsyncTest, TheOwnQueueWaitsForAndSignalsSemaphores) {
         const uint64_t before = gpu.semaphoreValue();
         ASSERT_TRUE(gpu.submit({frames, frame}));
         EXPECT_EQ(gpu.semaphoreValue(), before + 1);
-        uint64_t done = 0;
-        vkGetSemaphoreCounterValue(vulkan.device, gpu.semaphore(), &done);
-        EXPECT_EQ(done, before) << "the frame has not finished, so nothing may have been written";
+        const VkSemaphore written = gpu.semaphore();
+        const uint64_t next = before + 1;
+        const VkSemaphoreWaitInfo wait{
+            VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO, nullptr, 0, 1, &written, &next,
+        };
+        constexpr uint64_t wait_ns = 200'000'000;  // an update that waits for nothing takes milliseconds
+        EXPECT_EQ(vkWaitSemaphores(vulkan.device, &wait, wait_ns), VK_TIMEOUT)
+            << "the frame has not finished, so nothing may have been written";
         const VkSemaphoreSignalInfo signal{VK_STRUCTURE_TYPE_SEMAPHORE_SIGNAL_INFO, nullptr, frames, frame};
         ASSERT_EQ(vkSignalSemaphore(vulkan.device, &signal), VK_SUCCESS);
         EXPECT_TRUE(gpu.wait());

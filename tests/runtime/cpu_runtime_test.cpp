@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include "model_pack.h"
 #include "pages.h"
 
 #include <cstdlib>
@@ -137,13 +138,18 @@ TEST(CpuRuntime, HostileRecordsNeverPutInfinityOrNanIntoThePages) {
     expectFinite();
 }
 
-// In a process of its own: a pool where no memory is left, whose work the caller then does alone.
-[[noreturn]] void workWithoutMemory() {
+// For a process of its own.
+void takeAllMemory() {
     constexpr rlimit no_more{0, 0};
     setrlimit(RLIMIT_AS, &no_more);
     for (size_t bytes = 1 << 20; bytes >= 8; bytes /= 2)
         while (::operator new(bytes, std::nothrow)) {
         }
+}
+
+// A pool where no memory is left, whose work the caller then does alone.
+[[noreturn]] void workWithoutMemory() {
+    takeAllMemory();
     uint32_t calls = 0;
     WorkerPool pool(8);
     pool.run([&](uint32_t) { ++calls; });
@@ -152,6 +158,31 @@ TEST(CpuRuntime, HostileRecordsNeverPutInfinityOrNanIntoThePages) {
 
 TEST(WorkerPoolDeathTest, WithoutMemoryTheCallerWorksAlone) {
     EXPECT_EXIT(workWithoutMemory(), testing::ExitedWithCode(0), "");
+}
+
+// Texels, probes and a model, on threads: an update that takes memory would throw, and leave its work undone.
+[[noreturn]] void updateWithoutMemory() {
+    PackData data = test::modelPack(3, 100, [](glm::vec3) { return glm::vec3(0.1f); });
+    test::addLightOnProbes(data, 0, encodeE5B9G9R9(1, 1, 1), [](glm::vec3) { return true; });
+    const Pack pack = packOf(std::move(data));
+    const Pack large = packOf(test::randomPack(3, {.clusters = 2000, .page_count = 4, .page_side = 512}));
+    CpuRuntime grid(pack, 4, 64), wanted_grid(pack, 1, 64);
+    CpuRuntime texels(large, 4), wanted_texels(large);
+    const bool added = grid.addModel({}, {}) && wanted_grid.addModel({}, {});
+    wanted_grid.update();
+    wanted_texels.update();
+    takeAllMemory();
+    const bool all_threads = texels.update().batches >= 4 * 256;  // fewer would be left to one
+    const bool resampled = grid.update().probes_resampled == 8;
+    const bool same = std::ranges::equal(texels.irradiancePages(), wanted_texels.irradiancePages()) &&
+                      std::ranges::equal(texels.directionPages(), wanted_texels.directionPages()) &&
+                      std::ranges::equal(grid.irradiancePages(), wanted_grid.irradiancePages()) &&
+                      std::ranges::equal(grid.probes(), wanted_grid.probes());
+    std::_Exit(added && all_threads && resampled && same ? 0 : 2);
+}
+
+TEST(WorkerPoolDeathTest, WithoutMemoryUpdatesDoAllTheirWork) {
+    EXPECT_EXIT(updateWithoutMemory(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

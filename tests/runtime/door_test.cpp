@@ -1,6 +1,8 @@
 #include <dimmer/door.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace dimmer::test {
@@ -17,6 +19,30 @@ TEST(DoorWeight, HingedFollowsWhatTheLeafUncovers) {
     EXPECT_EQ(hingedDoorWeight(3, pi / 2), 1);
     EXPECT_EQ(hingedDoorWeight(0.1f, 0), 1);
     EXPECT_EQ(hingedDoorWeight(0, 0), 0);
+}
+
+// Against the cosines in double, whose own cancellation is 1e-16 of 1 - cos 0.01 = 5e-5: nothing beside a float's.
+TEST(DoorWeight, HingedIsTheFormulaForSmallAnglesToo) {
+    for (const float max : {0.01f, 0.3f, 1.0f, 1.9f, pi})
+        for (const float share : {0.01f, 0.1f, 0.5f, 0.9f, 0.999f}) {
+            const float angle = share * max;
+            const double expected =
+                (1 - std::cos(static_cast<double>(angle))) / (1 - std::cos(static_cast<double>(max)));
+            // Two sines, a quotient and a square, each to 6e-8 or the double of it.
+            EXPECT_NEAR(hingedDoorWeight(angle, max), expected, 5e-7 * expected) << angle << " of " << max;
+        }
+    // Where the float's cosine is 1: the square of the share, to the fourth order of the angle, 1e-16.
+    EXPECT_NEAR(hingedDoorWeight(0.5e-4f, 1e-4f), 0.25f, 5e-7 * 0.25);
+}
+
+TEST(DoorWeight, HingedStaysClosedHoweverLittleItTurns) {
+    for (const float max : {1e-4f, 1e-20f, std::numeric_limits<float>::denorm_min()})
+        EXPECT_EQ(hingedDoorWeight(0, max), 0) << max;
+}
+
+TEST(DoorWeight, HingedOfNoNumberIsNone) {
+    for (const float max : {1.0f, 0.0f}) EXPECT_TRUE(std::isnan(hingedDoorWeight(NAN, max))) << max;
+    EXPECT_TRUE(std::isnan(hingedDoorWeight(1, NAN)));
 }
 
 TEST(DoorWeight, SlidingIsTravelOverWidth) {

@@ -8,9 +8,11 @@
 #include <spirv/sample_lightmap_comp.h>
 #include <spirv/scatter_texels_comp.h>
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <set>
 #include <span>
 
 namespace dimmer {
@@ -36,6 +38,31 @@ size_t inexactInstructions(std::span<const uint32_t> words) {
         if (geometric || (function >= radians && function < pack && !min_max_clamp)) ++count;
     }
     return count;
+}
+
+// Sums, differences and products that a device may join into one operation, of one rounding: those without the
+// decoration NoContraction, GLSL's `precise`.
+size_t contractibleInstructions(std::span<const uint32_t> words) {
+    constexpr uint32_t op_decorate = 71, no_contraction = 42;
+    constexpr uint32_t f_add = 129, f_sub = 131, f_mul = 133, vector_times_scalar = 142;
+    std::set<uint32_t> precise, results;
+    for (size_t at = 5; at < words.size(); at += std::max(words[at] >> 16, 1u)) {
+        const uint32_t op = words[at] & 0xffff;
+        if (op == op_decorate && words[at + 2] == no_contraction) precise.insert(words[at + 1]);
+        if (op == f_add || op == f_sub || op == f_mul || op == vector_times_scalar) results.insert(words[at + 2]);
+    }
+    EXPECT_FALSE(results.empty());
+    return static_cast<size_t>(std::ranges::count_if(results, [&](uint32_t id) { return !precise.contains(id); }));
+}
+
+TEST(ExactArithmetic, KernelsLetNoDeviceJoinProductsAndSums) {
+    EXPECT_EQ(contractibleInstructions(spirv::blend_texels_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::blend_probes_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::resample_probes_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::gather_texels_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::scatter_texels_comp), 0u);
+    EXPECT_GT(contractibleInstructions(spirv::sample_lightmap_comp), 0u)
+        << "which agrees with the CPU but for rounding";
 }
 
 TEST(ExactArithmetic, KernelsAskForNothingThatDevicesRoundInTheirOwnWay) {

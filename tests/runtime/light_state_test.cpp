@@ -89,6 +89,21 @@ TEST_F(LightStateTest, HandlesOfTheWrongKindAreRefused) {
     expectAsAtTheStart();
 }
 
+TEST_F(LightStateTest, HandlesThatNobodyLookedUpAreRefused) {
+    EXPECT_EQ(state.setWeight(LightSet(), 0).error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(state.setDoor(Door(), 1).error().code, ErrorCode::InvalidArgument);
+    expectAsAtTheStart();
+    EXPECT_EQ(state.weight(LightSet()), Weight(0));
+    // The first element may as well be a door.
+    PackData data;
+    data.page_count = data.page_width = data.page_height = 1;
+    data.base_pages.resize(1);
+    data.elements = {{"front", ElementKind::Door, 1}};
+    CpuRuntime doors(*Pack::fromData(std::move(data)));
+    EXPECT_EQ(doors.setDoor(Door(), 1).error().code, ErrorCode::InvalidArgument);
+    EXPECT_EQ(doors.open(Door{0}), 0);
+}
+
 TEST_F(LightStateTest, AppliesATextState) {
     ASSERT_TRUE(state.apply(" hall = 0.5 , alarm=1/0.2/0.25, door:front=1"));
     EXPECT_EQ(weightOf("hall"), Weight(0.5f));

@@ -179,7 +179,67 @@ TEST(Models, WhatMakesNoSenseIsRefused) {
     EXPECT_EQ(none.addModel({}, {}).error().code, ErrorCode::OutOfMemory);
 }
 
+// Scaled until the way back is no float any more, and boxes as small.
+TEST(Models, OfNextToNoSizeHaveSlotsOfNumbers) {
+    const Pack pack = packOf(gradientPack());
+    CpuRuntime runtime(pack, 1, 64);
+    const auto scaled = [](float s, float x) { return Transform{{{{s, 0, 0, x}, {0, s, 0, 0}, {0, 0, s, 0}}}}; };
+    const Model model = *runtime.addModel({}, {});
+    const auto expectFinite = [&](Model of, const char* what) {
+        const ModelSlot slot = *runtime.modelSlot(of);
+        for (const auto& row : slot.grid_from_world)
+            for (const float v : row) EXPECT_TRUE(std::isfinite(v)) << what << " " << v;
+    };
+    for (const float x : {0.0f, 5.0f, 3e38f}) {
+        for (const float s : {1e-39f, -1e-39f, 1e-45f, 1e-20f, 1e-37f, 1e38f}) {
+            const auto added = runtime.addModel({}, scaled(s, x));
+            ASSERT_TRUE(added);
+            expectFinite(*added, "added");
+            ASSERT_TRUE(runtime.removeModel(*added));
+            ASSERT_TRUE(runtime.moveModel(model, scaled(s, x)));
+            expectFinite(model, "moved");
+            runtime.update();
+        }
+        const auto speck = runtime.addModel({{0, 0, 0}, {1e-39f, 1e-39f, 1e-39f}, {2, 2, 2}}, scaled(1, x));
+        ASSERT_TRUE(speck);
+        expectFinite(*speck, "speck");
+        ASSERT_TRUE(runtime.removeModel(*speck));
+    }
+    // All of it is its first probe, whose light is that of the place: x = 5, (1 + 5) pi lux.
+    ASSERT_TRUE(runtime.moveModel(model, scaled(1e-39f, 5)));
+    runtime.update();
+    const GridSampler sampler(pack, runtime.probes());
+    const float expected = 6 * std::numbers::pi_v<float>;  // to half a per cent: see above
+    EXPECT_NEAR(sampler.sample(*runtime.modelSlot(model), {5, 0, 0}, {0, 1, 0})[1], expected, 0.005f * expected);
+}
+
+TEST(Models, APackWithoutAGridKeepsNoRoomForThem) {
+    test::Random random(4);
+    PackData data = test::randomPack(4);
+    test::addRandomProbes(data, random);
+    const Pack pack = packOf(std::move(data));
+    CpuRuntime runtime(pack, 1, 4096);
+    EXPECT_EQ(runtime.probes().size(), CpuRuntime(pack).probes().size());
+    EXPECT_EQ(runtime.addModel({}, {}).error().code, ErrorCode::Unsupported);
+}
+
 using GpuModels = test::GpuTest;
+
+TEST_F(GpuModels, APackWithoutAGridKeepsNoRoomForThem) {
+    test::Random random(4);
+    PackData with_probes = test::randomPack(4);
+    test::addRandomProbes(with_probes, random);
+    PackData still = test::randomPack(5, {.clusters = 0});  // nothing in it changes
+    still.contributions.clear();
+    for (PackData* data : {&with_probes, &still}) {
+        const Pack pack = packOf(std::move(*data));
+        const DeviceFootprint without = runtimeOf(pack, {.buffering = Buffering::Double}).footprint();
+        const DeviceFootprint with =
+            runtimeOf(pack, {.buffering = Buffering::Double, .moving_probes_max = 4096}).footprint();
+        EXPECT_EQ(with.bytes, without.bytes);
+        EXPECT_EQ(with.pipelines, without.pipelines);
+    }
+}
 
 // Random light with directions and visibility, as far from smooth as a grid can be.
 PackData wildPack(uint32_t seed, ColorFormat format) {

@@ -89,6 +89,75 @@ TEST(Planner, NothingChangedIsNoWork) {
     EXPECT_EQ(planner.stats().batches, 0u);
 }
 
+// What went and came back is looked at once, not with every idle update from then on.
+TEST(Planner, WhatProvedUnchangedIsNotLookedAtAgain) {
+    const PackData data = test::randomPack(9);
+    Planner planner(data);
+    planner.plan();
+    EXPECT_TRUE(planner.upToDate());
+    for (uint32_t i = 0; i < data.elements.size(); ++i) {
+        const Weight before = planner.element(i);
+        planner.setElement(i, 0.5f);
+        planner.setElement(i, before);
+    }
+    EXPECT_EQ(planner.suspects(), data.elements.size());
+    EXPECT_TRUE(planner.upToDate());
+    EXPECT_EQ(planner.suspects(), 0u);
+    // Of two sets that changed one comes back.
+    planner.setElement(1, 0.5f);
+    planner.setElement(2, 0.5f);
+    EXPECT_FALSE(planner.upToDate());
+    const size_t of_both = planner.suspects();
+    planner.setElement(2, 1);
+    EXPECT_FALSE(planner.upToDate());
+    EXPECT_GT(planner.suspects(), 0u);
+    EXPECT_LT(planner.suspects(), of_both);
+    planner.setElement(1, 1);
+    EXPECT_TRUE(planner.upToDate());
+    EXPECT_EQ(planner.suspects(), 0u);
+    EXPECT_FALSE(planner.plan());
+}
+
+// Asking changes no answer: of two planners with one history the one that is asked before every plan plans the same.
+TEST(Planner, UpToDateIsWhatThePlanFinds) {
+    PackData data = test::randomPack(10);
+    test::Random records(10);
+    const auto light = [&](float low, float high) {
+        const uint32_t code = test::floorUfloatCode(test::uniform(records, low, high), 6);
+        return code | code << 11;
+    };
+    // No black base: there a step of the format is so small that any change is more of them than are tolerated.
+    for (TexelRecord& record : data.base_pages) record.irradiance = light(10, 1000);
+    for (TexelRecord& record : data.payload) record.irradiance = light(1, 100);
+    for (const float tolerance : {0.0f, 2.0f, 50.0f}) {
+        Planner asked(data), silent(data);
+        asked.setLimits({.tolerance_quanta = tolerance});
+        silent.setLimits({.tolerance_quanta = tolerance});
+        test::Random random(10);
+        uint32_t idle = 0, put_off = 0;
+        for (int step = 0; step < 400; ++step) {
+            const uint32_t element = test::pick(random, 0, static_cast<uint32_t>(data.elements.size()) - 1);
+            const float by = test::uniform(random, -1e-3f, 1e-3f);
+            const float value = std::clamp(asked.element(element).r + by, 0.0f, 1.0f);
+            asked.setElement(element, value);
+            silent.setElement(element, value);
+            const bool up_to_date = asked.upToDate();
+            const UpdateStats found = asked.stats();
+            ASSERT_EQ(up_to_date, !silent.plan());
+            idle += up_to_date;
+            put_off += up_to_date && silent.stats().clusters_put_off > 0;
+            if (up_to_date) {
+                ASSERT_EQ(found.clusters_put_off, silent.stats().clusters_put_off);
+                ASSERT_EQ(found.contributions_changed, silent.stats().contributions_changed);
+            }
+            ASSERT_EQ(asked.plan(), !up_to_date);
+            ASSERT_EQ(recordsRead(asked, data), recordsRead(silent, data));
+        }
+        EXPECT_EQ(put_off > 0, tolerance > 0);
+        EXPECT_LT(idle, 400u) << "something was written";
+    }
+}
+
 TEST(Planner, OneSetToggledReadsOnlyWhatIsOnWhereItIsHeld) {
     const PackData data = setsOnly(3);
     Planner planner(data);

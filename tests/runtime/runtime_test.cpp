@@ -3,6 +3,7 @@
 #include <dimmer/runtime.h>
 #include <gmock/gmock.h>
 #include <gpu/lightmap_pages.h>
+#include <gpu/memory.h>
 #include <gpu/queue_family.h>
 
 #include "gpu_fixture.h"
@@ -168,6 +169,20 @@ TEST(PageLimits, LargerImagesThanTheDeviceHasAreRefused) {
     EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
     EXPECT_THAT(refused.error().message, testing::HasSubstr("fewer texels per metre"));
     EXPECT_FALSE(checkPageLimits(limits, 4097, 1, 1));
+}
+
+TEST_F(RuntimeTest, MoreThanTheDeviceAllocatesAtATimeIsUnsupported) {
+    VkPhysicalDeviceMaintenance3Properties allocations{};
+    allocations.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES;
+    VkPhysicalDeviceProperties2 properties{};
+    properties.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2;
+    properties.pNext = &allocations;
+    vkGetPhysicalDeviceProperties2(device().context().physical_device, &properties);
+    const auto refused = createBuffer(device().context(), allocations.maxMemoryAllocationSize + 1,
+                                      VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, MemoryUse::Device);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr(std::to_string(allocations.maxMemoryAllocationSize)));
 }
 
 TEST_F(RuntimeTest, WaitTellsTheTimeOnTheGpu) {

@@ -6,7 +6,6 @@
 #include <dimmer/light_state.h>
 
 #include <array>
-#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -15,7 +14,6 @@ namespace dimmer {
 
 class WorkerPool;
 struct WorkList;
-struct WorkItem;
 struct TexelRecord;
 
 class CpuRuntime : public LightState {
@@ -27,7 +25,8 @@ class CpuRuntime : public LightState {
     CpuRuntime(CpuRuntime&&) noexcept;
     CpuRuntime& operator=(CpuRuntime&&) noexcept;
 
-    // Blends what changed since the last call into the pages. Nothing changed: returns at once. Not thread-safe.
+    // Blends what changed since the last call into the pages. Nothing changed: returns at once. Allocates nothing, so
+    // nothing fails. Not thread-safe.
     UpdateStats update();
 
     // The lightmap pages, one after another, rows from the top; in the sampled formats: Pack::colorFormat() and
@@ -44,7 +43,8 @@ class CpuRuntime : public LightState {
     template <ColorFormat format>
     void updateProbes();
     void updateModels(UpdateStats& stats);
-    void forItems(const WorkList& work, const std::function<void(std::span<const WorkItem>)>& blend);
+    template <class Blend>
+    void forItems(const WorkList& work, const Blend& blend);
 
     std::unique_ptr<WorkerPool> pool_;  // none for one thread
     std::vector<uint32_t> irradiance_;

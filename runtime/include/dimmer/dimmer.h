@@ -11,6 +11,8 @@
 #ifndef DIMMER_DIMMER_H
 #define DIMMER_DIMMER_H
 
+#include <dimmer/version.h>
+
 #include <stddef.h>
 #include <stdint.h>
 
@@ -256,6 +258,10 @@ typedef struct dimmer_vulkan {
     uint32_t queue_family; /* the queue's, and that of the command buffers given to dimmer_lights_record() */
     VkQueue compute_queue; /* optional: where dimmer_lights_submit() runs; VK_NULL_HANDLE: on `queue` */
     uint32_t compute_queue_family;
+    /* What Dimmer asks for Vulkan's functions, once, in create. NULL: the loader that it was linked with. An engine
+     * that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names of the
+     * functions. The functions are the process's: all lights that live at one time need the same ones. */
+    PFN_vkGetInstanceProcAddr get_instance_proc_addr;
 } dimmer_vulkan;
 
 typedef enum dimmer_buffering {
@@ -265,7 +271,7 @@ typedef enum dimmer_buffering {
 
 /* DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue may be), a queue family that the device does not have, or
  * one without compute. DIMMER_UNSUPPORTED: a device below Vulkan 1.2, or one without a format or limit that the pack
- * needs. */
+ * needs; a loader without a function of Vulkan 1.2, or another one than lights have that live. */
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
                                           dimmer_buffering buffering, uint32_t moving_probes_max,
                                           dimmer_lights** lights);

@@ -8,12 +8,16 @@
 namespace dimmer {
 
 // A hinged leaf: the width that a leaf turned by `angle_rad` no longer covers, (1 - cos a) / (1 - cos a_max), clamped
-// to 0..1. `angle_max_rad`: where the door counts as open, up to pi; at or below 0, every angle above 0 is open.
+// to 0..1. `angle_max_rad`: where the door counts as open, up to pi; at or below 0, every angle above 0 is open. Where
+// either is NaN so is the weight, which setDoor refuses.
 inline float hingedDoorWeight(float angle_rad, float angle_max_rad) {
     constexpr float half_turn_rad = 3.14159265f;
-    const float angle = std::clamp(std::abs(angle_rad), 0.0f, half_turn_rad);
-    if (!(angle_max_rad > 0)) return angle > 0 ? 1.0f : 0.0f;
-    return std::min(1.0f, (1 - std::cos(angle)) / (1 - std::cos(std::min(angle_max_rad, half_turn_rad))));
+    const float half_angle = 0.5f * std::min(std::abs(angle_rad), half_turn_rad);
+    const float half_max = 0.5f * std::min(angle_max_rad, half_turn_rad);
+    if (half_max <= 0) return half_angle > 0 ? 1.0f : half_angle;
+    // 1 - cos a = 2 sin^2(a / 2): cosines of small angles are 1 to the last bit.
+    const float share = std::sin(half_angle) / std::sin(half_max);
+    return std::min(share * share, 1.0f);  // in this order: std::min(1, NaN) would be 1
 }
 
 // A sliding or lifting leaf: travel / width (height), clamped to 0..1. `width_m`: the travel at which it is open.

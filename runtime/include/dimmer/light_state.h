@@ -6,6 +6,7 @@
 #include <dimmer/pack.h>
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <string_view>
 #include <vector>
@@ -15,12 +16,13 @@ namespace dimmer {
 class ModelSlots;
 class Planner;
 
-// Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack.
+// Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack. One that came
+// from no look-up is refused.
 struct LightSet {
-    uint32_t element = 0;
+    uint32_t element = std::numeric_limits<uint32_t>::max();
 };
 struct Door {
-    uint32_t element = 0;
+    uint32_t element = std::numeric_limits<uint32_t>::max();
 };
 
 // Without a runtime. NotFound names the nearest.

@@ -22,6 +22,10 @@ struct VulkanContext {
     // images and buffers are shared concurrently between the two families, and no third may use them).
     VkQueue compute_queue = VK_NULL_HANDLE;
     uint32_t compute_queue_family = 0;
+    // What the runtime asks for Vulkan's functions, once, in create(). Null: the loader that it was linked with. An
+    // engine that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names
+    // of the functions. The functions are the process's: all runtimes that live at one time need the same ones.
+    PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
 };
 
 // How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
@@ -48,8 +52,8 @@ struct RuntimeOptions {
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
     // always-on light that doors let through is loaded in any case.
     bool load_records = true;
-    // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; 0: no models,
-    // and nothing is kept for them.
+    // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; 0, or a pack
+    // without a global light grid: no models, and nothing is kept for them.
     uint32_t moving_probes_max = 0;
     // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
@@ -94,7 +98,8 @@ class Runtime : public LightState {
    public:
     // Uploads the pack's records and the base pages (blocking). Device memory: what `dimmer inspect` states.
     // InvalidArgument: a null handle (only compute_queue may be), a queue family that the device does not have, or one
-    // without compute. Unsupported: a device below Vulkan 1.2, or without a format or limit that the pack needs.
+    // without compute. Unsupported: a device below Vulkan 1.2, or without a format or limit that the pack needs; a
+    // loader without a function of Vulkan 1.2, or another one than a runtime has that lives.
     // Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
     // Waits for what submit() and continueLoading() sent, and for nothing else. Of the caller's submissions those must

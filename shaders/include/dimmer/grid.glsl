@@ -58,8 +58,8 @@ float dimmer_determinant(vec3 a, vec3 b, vec3 c) {
 
 vec4 dimmer_barycentric(uint tetrahedron, vec3 point) {
     uvec4 probes_of = dimmer_tetrahedron_part(tetrahedron, 0u);
-    vec3 a = dimmer_probe_position(probes_of.x) - point, b = dimmer_probe_position(probes_of.y) - point;
-    vec3 c = dimmer_probe_position(probes_of.z) - point, d = dimmer_probe_position(probes_of.w) - point;
+    precise vec3 a = dimmer_probe_position(probes_of.x) - point, b = dimmer_probe_position(probes_of.y) - point;
+    precise vec3 c = dimmer_probe_position(probes_of.z) - point, d = dimmer_probe_position(probes_of.w) - point;
     vec4 volumes = vec4(dimmer_determinant(b, c, d), dimmer_determinant(a, d, c), dimmer_determinant(a, b, d),
                         dimmer_determinant(a, c, b));
     precise float sum = volumes.x + volumes.y + volumes.z + volumes.w;

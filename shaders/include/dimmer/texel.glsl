@@ -62,7 +62,8 @@ vec3 dimmer_lift(uint code, uint format) {
     if (format == dimmer_r11g11b10f)
         return uintBitsToFloat(uvec3((code & 0x7ffu) << 17, code << 6 & 0xffe0000u, code >> 4 & 0xffc0000u));
     float exponent_step = uintBitsToFloat(((code >> 27) + 103u) << 23);
-    return vec3(ivec3(code & 0x1ffu, code >> 9 & 0x1ffu, code >> 18 & 0x1ffu)) * exponent_step;
+    precise vec3 light = vec3(ivec3(code & 0x1ffu, code >> 9 & 0x1ffu, code >> 18 & 0x1ffu)) * exponent_step;
+    return light;
 }
 
 // x: the ambient share; yz: the highlight's moment b = (1-r) d_xy / d_z. `codes`: as a sampler returns them.
