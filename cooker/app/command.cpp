@@ -46,11 +46,4 @@ std::string refuseNotFinite(const std::string& text) {
     return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is no finite number";
 }
 
-std::string humanBytes(uint64_t bytes) {
-    const auto value = static_cast<double>(bytes);
-    if (bytes < 1000) return fmt::format("{} B", bytes);
-    if (bytes < 1000000) return fmt::format("{:.1f} kB", value / 1e3);
-    return fmt::format("{:.2f} MB", value / 1e6);
-}
-
 }  // namespace dimmer::cook

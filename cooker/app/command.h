@@ -47,6 +47,4 @@ Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std
 // For CLI::Option::check(): its own checks of ranges let "nan" pass.
 std::string refuseNotFinite(const std::string& text);
 
-std::string humanBytes(uint64_t bytes);
-
 }  // namespace dimmer::cook

@@ -5,6 +5,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
+#include <pipeline/human_bytes.h>
 #include <pipeline/level_files.h>
 #include <pipeline/write_level.h>
 #include <report/report.h>
@@ -217,12 +218,15 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_flag(
         "--suggest-combinations", a->suggest_combinations,
         "print the pairs of doors whose light depends on each other (each a warning, too) for dimmer_combinations");
-    c->add_flag("--per-set-passes", a->options.per_set_passes,
-                "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
-    c->add_option("--grid-baseline", a->options.grid_baseline,
-                  "the global grid as a baseline to measure it against: a uniform lattice of as many probes, probes "
-                  "unfitted, or without tables of what they see (unseen)")
-        ->check(CLI::IsMember({"uniform", "unfitted", "unseen"}));
+    auto* per_set_passes =
+        c->add_flag("--per-set-passes", a->options.per_set_passes,
+                    "gather once per light set instead of sharing rays: the same pack, slower; for comparison");
+    auto* grid_baseline =
+        c->add_option(
+             "--grid-baseline", a->options.grid_baseline,
+             "the global grid as a baseline to measure it against: a uniform lattice of as many probes, probes "
+             "unfitted, or without tables of what they see (unseen)")
+            ->check(CLI::IsMember({"uniform", "unfitted", "unseen"}));
     c->add_flag_callback(
         "--all-lights", [a] { a->options.light_grid = false; },
         "shadow rays to every light from everywhere, not to those alone that reach the surroundings; for comparison");
@@ -237,10 +241,14 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                   "write the level there as .glb, its meshes with the final lightmap UVs in TEXCOORD_1");
     auto* cache = c->add_option("--cache", a->options.cache,
                                 "folder of what earlier cooks found out; default: .dimmer-cache beside the pack");
-    c->add_flag("--no-cache", a->no_cache, "keep nothing and reuse nothing; the pack is the same")->excludes(cache);
-    c->add_option("--cache-limit", a->cache_limit_mb,
-                  "MiB that the cache may hold; what was used least recently goes first")
-        ->capture_default_str();
+    auto* no_cache =
+        c->add_flag("--no-cache", a->no_cache, "keep nothing and reuse nothing; the pack is the same")->excludes(cache);
+    auto* limit = c->add_option("--cache-limit", a->cache_limit_mb,
+                                "MiB that the cache may hold; what was used least recently goes first")
+                      ->capture_default_str()
+                      ->excludes(no_cache);
+    // What is measured against is made anew.
+    for (CLI::Option* baseline : {per_set_passes, grid_baseline}) baseline->excludes(cache)->excludes(limit);
     c->add_flag("--fit", a->options.fit,
                 "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
                 "probes, until it fits; "

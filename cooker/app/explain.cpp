@@ -2,6 +2,7 @@
 #include <app/files.h>
 #include <pipeline/contribution_text.h>
 #include <pipeline/explain.h>
+#include <pipeline/human_bytes.h>
 #include <pipeline/sample_points.h>
 
 #include <fmt/format.h>

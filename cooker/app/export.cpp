@@ -2,6 +2,7 @@
 #include <app/files.h>
 #include <app/terminal_progress.h>
 #include <pipeline/export_pack.h>
+#include <pipeline/human_bytes.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>

@@ -4,6 +4,7 @@
 #include <pack/pack_data.h>
 #include <pipeline/budget.h>
 #include <pipeline/contribution_text.h>
+#include <pipeline/human_bytes.h>
 
 #include <fmt/format.h>
 
@@ -166,7 +167,6 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                                  {"probe_bytes", e.probe_bytes}});
     j["clusters"] = d.clusters.size();
     j["batches"] = d.batches.size();
-    j["mixed_batches"] = 0;
     j["overlap_histogram"] = cost.overlap_histogram;
     j["budgets"] = budgetsJson(budgetsOf(d));
     j["settings"] = listedSettings(d.settings_json);

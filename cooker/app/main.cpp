@@ -1,6 +1,7 @@
 #include <app/command.h>
 #include <app/interrupt.h>
 #include <app/say.h>
+#include <dimmer/version.h>
 #include <update/state_text.h>
 
 #include <fmt/format.h>
@@ -69,6 +70,7 @@ int main(int argc, char** argv) {
         "Dimmer: baked global illumination that you can switch.\nCooks a glTF level into a pack, and looks into "
         "packs."};
     app.require_subcommand(1);
+    app.set_version_flag("--version", "dimmer " DIMMER_VERSION);
     app.footer(
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 3 over budget, "
         "4 error above --max-error, 130 interrupted (SIGTERM 143, SIGHUP 129).\n"

@@ -2,6 +2,7 @@
 #include <app/files.h>
 #include <app/say.h>
 #include <app/terminal_progress.h>
+#include <pipeline/human_bytes.h>
 #include <stress/stress.h>
 
 #include <fmt/format.h>

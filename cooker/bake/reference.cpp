@@ -12,7 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float start_offset_m = 2e-4f;
 // Roulette ends paths; the limit is for nothing but a bound (0.99^4096, the largest reflectance's share, is 1e-18).
 constexpr int roulette_after = 3, vertices_max = 4096;
 // Shadow rays to lamps per vertex; with no more lamps than that, each gets its own.
@@ -282,7 +281,7 @@ std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit)
     if (hit.back && !material.double_sided) return std::nullopt;
     if (rays_.scene().meshes[triangle.mesh].lighting == Lighting::None) return std::nullopt;
     const glm::vec3 normal = hit.back ? -triangle.normal : triangle.normal;
-    return Vertex{.point = rays_.pointOn(hit.triangle, hit.u, hit.v) + normal * start_offset_m,
+    return Vertex{.point = rays_.pointOn(hit.triangle, hit.u, hit.v) + normal * path_offset_m,
                   .normal = normal,
                   .reflectance = material.reflectance(glm::vec3(rays_.surfaceColor(hit.triangle, hit.u, hit.v)))};
 }
@@ -335,7 +334,7 @@ ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t
 ReferenceTracer::Start ReferenceTracer::startAt(const ReferencePoint& point) const {
     Start start;
     const bool on_surface = point.surface != glm::vec3(0);
-    start.vertex.point = point.position_m + (on_surface ? point.surface : point.normal) * start_offset_m;
+    start.vertex.point = point.position_m + (on_surface ? point.surface : point.normal) * path_offset_m;
     start.vertex.normal = point.normal;
     start.vertex.horizon = point.surface;
     start.direct_lux = directPart(start.vertex);

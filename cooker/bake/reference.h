@@ -11,6 +11,9 @@
 
 namespace dimmer::cook {
 
+// How far off a surface paths start.
+inline constexpr float path_offset_m = 2e-4f;
+
 // Which light is asked for.
 struct ReferenceOptions {
     uint32_t seed = 1;

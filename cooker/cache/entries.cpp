@@ -172,7 +172,10 @@ std::vector<std::byte> toBytes(const ChartsEntry& entry) {
     out.put(std::array{entry.charts.page_width, entry.charts.page_height, entry.charts.page_count});
     visitUnwrap(entry.charts, put);
     out.put(uint64_t{entry.charts.warnings.size()});
-    for (const std::string& warning : entry.charts.warnings) out.putString(warning);
+    for (const ChartWarning& warning : entry.charts.warnings) {
+        out.put(warning.mesh);
+        out.putString(warning.text);
+    }
     visitTexels(entry.texels, put);
     return out.take();
 }
@@ -187,7 +190,11 @@ std::optional<ChartsEntry> chartsFromBytes(std::span<const std::byte> bytes) {
     entry.charts.page_height = size[1];
     entry.charts.page_count = size[2];
     visitUnwrap(entry.charts, get);
-    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) entry.charts.warnings.push_back(in.getString());
+    for (auto n = in.get<uint64_t>(); in.fits(n, 1) && n > 0; --n) {
+        auto& [mesh, text] = entry.charts.warnings.emplace_back();
+        mesh = in.get<uint32_t>();
+        text = in.getString();
+    }
     visitTexels(entry.texels, get);
     return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
 }

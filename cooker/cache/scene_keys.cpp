@@ -2,6 +2,8 @@
 
 #include <scene/ies.h>
 
+#include <map>
+
 namespace dimmer::cook {
 namespace {
 
@@ -22,7 +24,6 @@ void addMatrix(KeyBuilder& key, const glm::dmat4& m) {
 
 // What a material does to light that it did not emit.
 void addSurface(KeyBuilder& key, const Material& m) {
-    key.add(m.name);
     add(key, m.base_color);
     key.add(m.metallic).add(m.specular).add(m.alpha).add(m.alpha_mode).add(m.alpha_cutoff);
     key.add(uint32_t{m.double_sided}).addOptional(m.base_color_texture);
@@ -38,8 +39,19 @@ void addTexture(KeyBuilder& key, const Texture& texture) {
     addAll(key, texture.texels);
 }
 
-void addMesh(KeyBuilder& key, const SceneMesh& mesh) {
-    key.add(mesh.node);
+// Numbers of the file, of which it matters alone which are the same: a camera more shifts them all.
+class Ranks {
+   public:
+    // Of the first that has the number; -1 stays what it is.
+    int of(int number) {
+        return number < 0 ? number : ranks_.try_emplace(number, static_cast<int>(ranks_.size())).first->second;
+    }
+
+   private:
+    std::map<int, int> ranks_;
+};
+
+void addMesh(KeyBuilder& key, const SceneMesh& mesh, Ranks& nodes, Ranks& meshes) {
     addAll(key, mesh.positions_m);
     addAll(key, mesh.normals);
     addAll(key, mesh.uv0);
@@ -50,7 +62,7 @@ void addMesh(KeyBuilder& key, const SceneMesh& mesh) {
     key.add(mesh.lighting).addOptional(mesh.door).add(uint32_t{mesh.is_open_leaf});
     addMatrix(key, mesh.open_from_closed);
     key.addOptional(mesh.texels_per_metre).addOptional(mesh.grid_spacing_m);
-    key.add(mesh.gltf_node).add(mesh.gltf_mesh);
+    key.add(nodes.of(mesh.gltf_node)).add(meshes.of(mesh.gltf_mesh));
     addMatrix(key, mesh.world_from_node);
 }
 
@@ -90,7 +102,8 @@ Key geometryKey(const Scene& scene) {
     key.add(uint64_t{scene.textures.size()});
     for (const auto& texture : scene.textures) addTexture(key, *texture);
     key.add(uint64_t{scene.meshes.size()});
-    for (const SceneMesh& mesh : scene.meshes) addMesh(key, mesh);
+    Ranks nodes, meshes;
+    for (const SceneMesh& mesh : scene.meshes) addMesh(key, mesh, nodes, meshes);
     key.add(uint64_t{scene.models.size()});
     for (const SceneModel& model : scene.models)
         for (int axis = 0; axis < 3; ++axis) key.add(model.probes[axis]);
@@ -110,6 +123,7 @@ Key geometryKey(const Scene& scene) {
 Key sceneKey(const Scene& scene) {
     KeyBuilder key("scene");
     key.add(geometryKey(scene)).add(scene.file);
+    for (const SceneMesh& mesh : scene.meshes) key.add(mesh.node);  // the pack and warnings name it
     key.add(uint64_t{scene.light_sets.size()});
     for (uint32_t s = 0; s < scene.light_sets.size(); ++s)
         key.add(scene.light_sets[s].name).add(scene.light_sets[s].max_weight);
@@ -212,9 +226,16 @@ Key gridSettingsKey(const GridSettings& s, const Scene& scene) {
     return key.finish();
 }
 
-Key gridKey(const Key& settings, std::span<const Key> groups) {
+Key lampOrderKey(const Scene& scene) {
+    KeyBuilder key("order of lamps");
+    for (const PunctualLight& light : scene.lights)
+        if (light.bake != BakeMode::None) key.add(groupOf(light.light_set));
+    return key.finish();
+}
+
+Key gridKey(const Key& settings, const Key& lamp_order, std::span<const Key> groups) {
     KeyBuilder key("grid");
-    key.add(settings).add(uint64_t{groups.size()});
+    key.add(settings).add(lamp_order).add(uint64_t{groups.size()});
     for (const Key& group : groups) key.add(group);
     return key.finish();
 }

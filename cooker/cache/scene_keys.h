@@ -12,7 +12,8 @@
 
 namespace dimmer::cook {
 
-// Meshes, doors and materials without what they emit: all that decides where receivers are and what rays meet.
+// Meshes, doors and materials without what they emit: all that decides where receivers are and what rays meet. Without
+// the names of nodes and materials, which entries must not hold.
 Key geometryKey(const Scene& scene);
 
 // Everything in a level.
@@ -43,7 +44,10 @@ Key placesKey(const Key& scene, std::span<const float> what);
 
 // What the global grid depends on besides the groups' light.
 Key gridSettingsKey(const GridSettings& settings, const Scene& scene);
+// How the groups' lamps take turns in the level: with each group's own, the order of all, by which the grid looks
+// around them.
+Key lampOrderKey(const Scene& scene);
 // The global grid. `groups`: groupKey of each.
-Key gridKey(const Key& settings, std::span<const Key> groups);
+Key gridKey(const Key& settings, const Key& lamp_order, std::span<const Key> groups);
 
 }  // namespace dimmer::cook

@@ -108,7 +108,7 @@ Expected<void> CacheStore::keep(std::string_view kind, const Key& key, std::span
     return writeFileAtomically(folder_ / name, encode(bytes, name), Flush::No);
 }
 
-uint64_t CacheStore::trim(uint64_t bytes_max) const {
+std::vector<std::string> CacheStore::trim(uint64_t bytes_max) const {
     struct File {
         fs::path path;
         fs::file_time_type used;
@@ -131,11 +131,13 @@ uint64_t CacheStore::trim(uint64_t bytes_max) const {
     }
     std::ranges::sort(files,
                       [](const File& a, const File& b) { return std::tie(a.used, a.path) < std::tie(b.used, b.path); });
+    std::vector<std::string> removed;
     for (size_t i = 0; i < files.size() && sum > bytes_max; ++i) {
         fs::remove(files[i].path, error);
         sum -= files[i].bytes;
+        removed.push_back(files[i].path.filename().string());
     }
-    return sum;
+    return removed;
 }
 
 }  // namespace dimmer::cook

@@ -6,6 +6,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,8 +38,8 @@ class CacheStore {
     Expected<void> keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const;
 
     // Removes the entries that were used least recently until all together have at most `bytes_max`, and what killed
-    // cooks left behind. Returns the bytes that are left.
-    uint64_t trim(uint64_t bytes_max) const;
+    // cooks left behind. Returns the names of those that were removed.
+    std::vector<std::string> trim(uint64_t bytes_max) const;
 
     const std::filesystem::path& folder() const { return folder_; }
 

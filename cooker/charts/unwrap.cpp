@@ -42,18 +42,22 @@ std::vector<Face> listFaces(const RayScene& rays) {
     return faces;
 }
 
-// A surface larger than a page is stored as coarse as fits one: told once for each mesh.
+// A surface larger than a page is stored as coarse as fits one: told once for each node.
 void warnOfCoarseness(const RayScene& rays, Unwrap& out, uint32_t face, float texels, uint32_t side_max) {
     const auto usable = static_cast<float>(side_max - 2 * padding_texels);
     if (!(texels > usable + 1)) return;
-    const std::string owner = fmt::format("{}: node '{}': ", rays.scene().file,
-                                          rays.scene().meshes[rays.triangles()[out.faces[face].triangle].mesh].node);
-    if (std::ranges::any_of(out.warnings, [&](const std::string& w) { return w.starts_with(owner + "one of"); }))
-        return;
-    out.warnings.push_back(fmt::format(
-        "{}one of its surfaces is {:.0f} texels long, a page {}: it is stored {:.1f} times as coarse. Cut the "
-        "surface, raise lightmaps.page_size, or lower the density.",
-        owner, texels, side_max, texels / usable));
+    const uint32_t mesh = rays.triangles()[out.faces[face].triangle].mesh;
+    constexpr std::string_view what = "one of its surfaces is";
+    const auto said = [&](const ChartWarning& w) {
+        const int node = rays.scene().meshes[mesh].gltf_node;
+        const bool same = w.mesh == mesh || (node >= 0 && rays.scene().meshes[w.mesh].gltf_node == node);
+        return same && w.text.starts_with(what);
+    };
+    if (std::ranges::any_of(out.warnings, said)) return;
+    out.warnings.push_back(
+        {mesh, fmt::format("{} {:.0f} texels long, a page {}: it is stored {:.1f} times as coarse. Cut the surface, "
+                           "raise lightmaps.page_size, or lower the density.",
+                           what, texels, side_max, texels / usable)});
 }
 
 // A chart of the file's own UVs, scaled to the wanted density on average.
@@ -183,10 +187,9 @@ bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& o
 
 std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& options, Unwrap& out) {
     const Scene& scene = rays.scene();
-    for (const SceneMesh& mesh : scene.meshes)
-        if (!mesh.uv1_fault.empty())
-            out.warnings.push_back(fmt::format("{}: node '{}': TEXCOORD_1 is no lightmap unwrap ({}); charts were made",
-                                               scene.file, mesh.node, mesh.uv1_fault));
+    for (uint32_t m = 0; m < scene.meshes.size(); ++m)
+        if (const std::string& fault = scene.meshes[m].uv1_fault; !fault.empty())
+            out.warnings.push_back({m, fmt::format("TEXCOORD_1 is no lightmap unwrap ({}); charts were made", fault)});
     std::vector<Placed> charts;
     std::vector<PlanarFace> planar;
     std::vector<uint32_t> planar_ids;

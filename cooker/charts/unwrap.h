@@ -37,6 +37,12 @@ struct TangentFrame {
 TangentFrame tangentFrame(const std::array<glm::vec3, 3>& positions_m, const std::array<glm::vec2, 3>& uv_texels,
                           glm::vec3 normal, float& texel_area_m2);
 
+// Of a mesh of the scene, which the text does not name.
+struct ChartWarning {
+    uint32_t mesh = 0;
+    std::string text;
+};
+
 struct Unwrap {
     uint32_t page_width = 0, page_height = 0, page_count = 0;
     std::vector<Face> faces;
@@ -46,7 +52,7 @@ struct Unwrap {
     std::vector<float> texel_area_m2;             // per face
     std::vector<uint32_t> front_face, back_face;  // per level triangle; no_index where unlit
     std::vector<Chart> charts;
-    std::vector<std::string> warnings;
+    std::vector<ChartWarning> warnings;
 
     uint32_t faceOf(uint32_t triangle, bool back) const { return (back ? back_face : front_face)[triangle]; }
 };

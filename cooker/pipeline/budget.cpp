@@ -1,5 +1,7 @@
 #include <pipeline/budget.h>
 
+#include <pipeline/human_bytes.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <probes/grid_table.h>
@@ -14,12 +16,6 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint64_t record_bytes = sizeof(TexelRecord);
-
-std::string humanBytes(uint64_t bytes) {
-    if (bytes < 1000) return fmt::format("{} B", bytes);
-    if (bytes < 1000000) return fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3);
-    return fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
-}
 
 std::string describe(const Element& element) {
     return fmt::format("{} '{}'", element.kind == ElementKind::Door ? "door" : "light set", element.name);

@@ -3,8 +3,6 @@
 #include <charts/wall_cuts.h>
 #include <pipeline/level_meshes.h>
 #include <pipeline/prepare_scene.h>
-#include <pipeline/profile.h>
-#include <pipeline/set_scales.h>
 
 #include <fmt/format.h>
 
@@ -23,25 +21,40 @@ bool sameUvs(const Mesh& a, const Mesh& b) {
 
 }  // namespace
 
-Expected<std::unique_ptr<ChartedLevel>> chartAgain(const std::filesystem::path& level, const PackData& pack) {
+ChartedLevel::ChartedLevel(Scene level, const Profile& profile) : scene(std::move(level)) {
+    scales = divideByScales(scene);
+    prepareScene(scene, profile);
+}
+
+Expected<void> ChartedLevel::chart(const Profile& profile) {
+    cutAtWalls(scene, profile.texels_per_metre);
+    rays.emplace(scene);
+    auto unwrapped = unwrap(*rays, unwrapOptions(profile));
+    if (!unwrapped) return std::unexpected(unwrapped.error());
+    charts = std::move(*unwrapped);
+    return {};
+}
+
+UnwrapOptions unwrapOptions(const Profile& profile) {
+    return {profile.texels_per_metre, profile.page_size};
+}
+
+Expected<std::unique_ptr<ChartedLevel>> chartAgain(Scene level, const PackData& pack) {
     const auto settings = readSettings(pack.settings_json);
     if (!settings) return std::unexpected(settings.error());
-    auto imported = importLevel(level);
-    if (!imported) return std::unexpected(imported.error());
-    auto charted = std::make_unique<ChartedLevel>();
-    charted->scene = std::move(*imported);
-    charted->copy_of = divideByScales(charted->scene).copy_of;
-    prepareScene(charted->scene, settings->profile);
-    cutAtWalls(charted->scene, settings->profile.texels_per_metre);
-    charted->rays = std::make_unique<RayScene>(charted->scene);
-    auto charts = unwrap(*charted->rays, {settings->profile.texels_per_metre, settings->profile.page_size});
-    if (!charts) return std::unexpected(charts.error());
-    charted->charts = std::move(*charts);
+    auto charted = std::make_unique<ChartedLevel>(std::move(level), settings->profile);
+    if (auto ok = charted->chart(settings->profile); !ok) return std::unexpected(ok.error());
     if (!std::ranges::equal(levelMeshes(*charted->rays, charted->charts), pack.meshes, sameUvs))
         return fail(ErrorCode::BadInput,
                     fmt::format("{}: its charts are not those of the pack: the level was changed since. Cook it again.",
-                                level.string()));
+                                charted->scene.file));
     return charted;
+}
+
+Expected<std::unique_ptr<ChartedLevel>> chartAgain(const std::filesystem::path& level, const PackData& pack) {
+    auto imported = importLevel(level);
+    if (!imported) return std::unexpected(imported.error());
+    return chartAgain(std::move(*imported), pack);
 }
 
 }  // namespace dimmer::cook

@@ -52,18 +52,6 @@ struct CookStats {
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats, CookCache* cache = nullptr, LossTable* losses = nullptr);
 
-// Whether this cook makes a global grid: as the profile says, and if it leaves that to the level, where something moves
-// (a mesh that is dynamic or has a local grid, `dimmer_dynamic`) or players do (`dimmer_play_area`).
-bool wantsGrid(const Profile& profile, const Scene& scene);
-
-BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const Scene& scene);
-
-// The profile as this cook uses it: what it says, then the level's `dimmer_settings`, then "key=value" texts. Names of
-// light sets that the level does not have are errors, but for a profile's own, which may be for other levels: they are
-// dropped, and come back as warnings.
-Expected<std::vector<std::string>> resolveSettings(Profile& profile, const Scene& scene,
-                                                   const std::vector<std::string>& set);
-
 struct CookResult {
     PackData pack;
     Profile profile;             // as resolved, and fitted

@@ -1,6 +1,7 @@
 #include <pipeline/cook_cache.h>
 
 #include <format/byte_stream.h>
+#include <pipeline/human_bytes.h>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -131,7 +132,10 @@ std::optional<PackEntry> CookCache::findPack(const Key& key) {
     const auto bytes = find(pack_kind, "pack", key, {"code", "level", "settings"});
     auto entry = bytes ? packFromBytes(*bytes) : std::nullopt;
     if (entry)
-        for (const std::string& part : entry->parts) store_.markUsed(part);
+        for (const std::string& part : entry->parts) {
+            store_.markUsed(part);
+            used_.push_back(part);
+        }
     return entry;
 }
 
@@ -258,7 +262,14 @@ void CookCache::finish(uint64_t bytes_max) {
     std::string ledger;
     for (const auto& [part, key] : all) ledger += part + "\t" + key + "\n";
     if (all != last_) keep(ledger_kind, ledger_, std::as_bytes(std::span(ledger)));
-    store_.trim(bytes_max);
+    const std::vector<std::string> removed = store_.trim(bytes_max);
+    const auto lost = std::ranges::count_if(
+        removed, [&](const std::string& name) { return std::ranges::find(used_, name) != used_.end(); });
+    if (lost > 0)
+        warnings_.push_back(
+            fmt::format("{}: {} of the entries that this cook used do not fit the {} that the cache may hold, and were "
+                        "removed: the next cook makes them again. Raise --cache-limit.",
+                        store_.folder().string(), lost, humanBytes(bytes_max)));
 }
 
 std::string describeGroup(const Scene& scene, uint32_t group) {
@@ -270,7 +281,7 @@ std::optional<GroupLight> CachedGroups::find(uint32_t group) {
 }
 
 std::optional<BakedGrid> CachedGroups::findGrid() {
-    std::vector<std::string> parts = {"settings of the grid"};
+    std::vector<std::string> parts = {"settings of the grid", lamp_order_part};
     for (uint32_t g = 0; g < keys_.size(); ++g)
         for (const std::string& part : partsOfGroup(describeGroup(scene_, g)))
             if (std::ranges::find(parts, part) == parts.end()) parts.push_back(part);

@@ -58,7 +58,8 @@ class CookCache {
     std::optional<RayEnds> findRays(const Key& key, size_t rows, uint32_t receivers, uint32_t paths);
     void keepRays(const Key& key, const RayEnds& ends);
 
-    // Ends the cook: removes old entries, and remembers what this one depended on.
+    // Ends the cook: removes old entries, and remembers what this one depended on. Warns where that removes what this
+    // very cook used.
     void finish(uint64_t bytes_max);
 
     const std::vector<CacheLine>& lines() const { return lines_; }
@@ -120,6 +121,9 @@ class CachedGroups final : public GroupStore {
     std::vector<Key> keys_;
     Key grid_, rays_;
 };
+
+// What the order of the groups' lamps is called, see lampOrderKey().
+inline constexpr const char* lamp_order_part = "order of lamps";
 
 // "always-on light" or "light set 'hall'".
 std::string describeGroup(const Scene& scene, uint32_t group);

@@ -2,13 +2,12 @@
 
 #include <bake/door_pairs.h>
 #include <bake/final_gather.h>
+#include <bake/reference.h>
 #include <bake/sampling.h>
 #include <bake/series.h>
-#include <charts/wall_cuts.h>
 #include <encode/encode.h>
-#include <pipeline/cook.h>
-#include <pipeline/prepare_scene.h>
-#include <pipeline/set_scales.h>
+#include <pipeline/charted_level.h>
+#include <pipeline/cook_settings.h>
 
 #include <tbb/parallel_for.h>
 
@@ -25,17 +24,12 @@ namespace {
 constexpr uint32_t many_rays = 8192;   // per texel; twice as many at the point itself
 constexpr uint32_t tilted_count = 16;  // normals per point
 constexpr uint32_t gather_seed = 0x5eed;
-// As the reference starts its paths.
-constexpr float start_offset_m = 2e-4f;
 // Points whose surface the charts know by another normal are no help.
 constexpr float same_normal_cos = 0.99f;
 
 // The cook up to its last gather.
 struct Rebake {
-    Scene scene;
-    SetScales scales;
-    std::optional<RayScene> rays;
-    Unwrap charts;
+    std::unique_ptr<ChartedLevel> level;
     Texels texels;
     std::optional<EmitterSampler> emitters;
     std::optional<DoorPaths> paths;
@@ -44,37 +38,22 @@ struct Rebake {
     Series series;
 };
 
-// As far as its charts, which must be the pack's.
-Expected<std::unique_ptr<Rebake>> rechart(Scene scene, const CookSettings& settings, const Pack& pack) {
-    auto bake = std::make_unique<Rebake>();
-    bake->scene = std::move(scene);
-    bake->scales = divideByScales(bake->scene);
-    prepareScene(bake->scene, settings.profile);
-    cutAtWalls(bake->scene, settings.profile.texels_per_metre);
-    bake->rays.emplace(bake->scene);
-    auto charts = unwrap(*bake->rays, {settings.profile.texels_per_metre, settings.profile.page_size});
-    if (!charts) return std::unexpected(charts.error());
-    bake->charts = std::move(*charts);
-    if (bake->charts.page_width != pack.pageWidth() || bake->charts.page_height != pack.pageHeight() ||
-        bake->charts.page_count != pack.pageCount())
-        return fail(ErrorCode::BadInput, "the pack's pages are not those of this level; cook the level again");
-    return bake;
-}
-
 Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress& progress) {
     const auto settings = readSettings(pack.data().settings_json);
     if (!settings) return std::unexpected(settings.error());
-    auto charted = rechart(std::move(scene), *settings, pack);
-    if (!charted) return charted;
-    std::unique_ptr<Rebake>& bake = *charted;
+    auto charted = chartAgain(std::move(scene), pack.data());
+    if (!charted) return std::unexpected(charted.error());
+    auto bake = std::make_unique<Rebake>();
+    bake->level = std::move(*charted);
+    const ChartedLevel& level = *bake->level;
     const Quality& quality = *settings->profile.quality(settings->quality);
-    bake->texels = sampleTexels(*bake->rays, bake->charts, quality.samples_per_texel);
-    bake->emitters.emplace(*bake->rays, meshGroups(bake->scene));
-    bake->paths.emplace(bake->scene, doorsInSight(*bake->rays));
-    bake->gatherer.emplace(*bake->rays, bake->charts, bake->texels, *bake->emitters, *bake->paths);
-    bake->settings = bakeSettings(settings->profile, quality, bake->scene);
+    bake->texels = sampleTexels(*level.rays, level.charts, quality.samples_per_texel);
+    bake->emitters.emplace(*level.rays, meshGroups(level.scene));
+    bake->paths.emplace(level.scene, doorsInSight(*level.rays));
+    bake->gatherer.emplace(*level.rays, level.charts, bake->texels, *bake->emitters, *bake->paths);
+    bake->settings = bakeSettings(settings->profile, quality, level.scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
-    return charted;
+    return bake;
 }
 
 // The texels that a bilinear filter mixes at a point.
@@ -106,10 +85,10 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
         for (uint32_t s = 0; s < bake.texels.sampleCount(receiver); ++s) {
             const SamplePoint& sample = bake.texels.sample(receiver, s);
             const float distance = glm::distance(sample.position_m, p.position_m);
-            if (glm::dot(bake.charts.frames[sample.face].normal, p.frame.normal) < same_normal_cos) continue;
+            if (glm::dot(bake.level->charts.frames[sample.face].normal, p.frame.normal) < same_normal_cos) continue;
             if (!(distance < nearest)) continue;
             nearest = distance;
-            out.centre = {{p.position_m + start_offset_m * p.frame.normal, sample.face}};
+            out.centre = {{p.position_m + path_offset_m * p.frame.normal, sample.face}};
         }
     }
     return out;
@@ -249,20 +228,20 @@ std::optional<Hit> nearestClosed(const RayScene& rays, glm::vec3 origin, glm::ve
 // A plain gather: emitters by hit alone.
 void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std::span<const glm::vec3> normals,
                    TermAccumulator<Falloff>& sum) {
-    const TangentFrame& frame = bake.charts.frames[from.face];
+    const TangentFrame& frame = bake.level->charts.frames[from.face];
     const float lux_per_radiance = pi / (2 * many_rays);
     for (uint32_t i = 0; i < 2 * many_rays; ++i) {
         const glm::vec3 d = cosineDirection(sequence2d(i, hash(id, gather_seed)));
         if (!(d.z > 1e-3f)) continue;
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        const auto hit = nearestClosed(*bake.rays, from.position_m, world, i);
+        const auto hit = nearestClosed(*bake.level->rays, from.position_m, world, i);
         if (!hit) {
-            sum[always_group].add(lux_per_radiance * skyRadiance(bake.scene, world), d, normals);
+            sum[always_group].add(lux_per_radiance * skyRadiance(bake.level->scene, world), d, normals);
             continue;
         }
         if (const Emitter* e = bake.emitters->emitterOf(hit->triangle); e && (!hit->back || e->double_sided))
             sum[e->group].add(lux_per_radiance * e->radiance_cd_m2, d, normals);
-        uint32_t found = receiverOf(bake.charts, bake.texels, *hit);
+        uint32_t found = receiverOf(bake.level->charts, bake.texels, *hit);
         if (found == no_index && !bake.gatherer->models().empty())
             found = bake.gatherer->modelReceiverAt(*hit, hash(id, i));
         if (found == no_index) continue;
@@ -334,9 +313,7 @@ void measureStorage(Storage& s, TermAccumulator<Falloff>& sum, std::span<const g
 }  // namespace
 
 Expected<void> checkRebake(const Scene& scene, const Pack& pack) {
-    const auto settings = readSettings(pack.data().settings_json);
-    if (!settings) return std::unexpected(settings.error());
-    const auto charted = rechart(scene, *settings, pack);
+    const auto charted = chartAgain(scene, pack.data());
     return charted ? Expected<void>() : std::unexpected(charted.error());
 }
 
@@ -346,7 +323,7 @@ Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::spa
     const auto bake = rebake(scene, pack, progress);
     if (!bake) return std::unexpected(bake.error());
     progress.stage("causes of error", points.size());
-    const Mixed mixed(*(*bake)->paths, (*bake)->scales, state);
+    const Mixed mixed(*(*bake)->paths, (*bake)->level->scales, state);
     std::vector<Steps> steps(points.size());
     tbb::parallel_for(size_t{0}, points.size(), [&](size_t i) {
         steps[i] = stepsAt(**bake, pack, points[i], pairs[i], mixed);

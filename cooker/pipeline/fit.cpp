@@ -24,8 +24,8 @@ constexpr double error_max = 1;             // what costs more light than there 
 // One budget that is set: what it would hold at some rungs.
 struct Limit {
     uint64_t budget;
-    std::function<uint64_t(const Rungs&)> bytes;
-    std::function<uint64_t(uint32_t, uint8_t, uint8_t)> saved_by;  // group, from, to
+    std::function<uint64_t(const RecordBytes&)> bytes;                               // of which texels have these
+    std::function<uint64_t(const LossSteps&, uint32_t, uint8_t, uint8_t)> saved_by;  // group, from, to
 };
 
 bool gridIsOver(const PackCost& cost, const Profile& profile) {
@@ -44,57 +44,68 @@ uint64_t scaled(uint64_t bytes, double share) {
     return static_cast<uint64_t>(std::llround(static_cast<double>(bytes) * share));
 }
 
-uint64_t texelRecords(const LossTable& losses) {
-    return losses.dynamicBytes(Rungs(losses.groupCount(), 0));
+RecordBytes recordsNow(const LossTable& losses) {
+    return losses.bytes(Rungs(losses.groupCount(), 0));
 }
 
 // Bytes of PackCost::dynamic that are not texels'. They are not in the table of losses: thresholds are taken to drop as
 // large a share of them.
 uint64_t probeRecords(const PackCost& cost, const LossTable& losses) {
-    return cost.dynamic - std::min(cost.dynamic, texelRecords(losses));
+    return cost.dynamic - std::min(cost.dynamic, recordsNow(losses).dynamic);
 }
 
 // Of all bytes of texels' records, the share that stays; what says where records belong goes with them.
-double recordsLeft(const LossTable& losses, uint64_t all, const Rungs& rungs) {
-    return all > 0 ? ratio(losses.dynamicBytes(rungs), all) : 1;
+double recordsLeft(const RecordBytes& now, const RecordBytes& then) {
+    return now.dynamic > 0 ? ratio(then.dynamic, now.dynamic) : 1;
 }
 
 std::vector<Limit> limitsOf(const PackData& pack, const PackCost& cost, const Profile& profile,
                             const LossTable& losses) {
     std::vector<Limit> limits;
-    const auto records = [&losses](uint32_t g, uint8_t from, uint8_t to) { return losses.step(g, from, to).bytes; };
-    const auto left = [&losses, all = texelRecords(losses)](uint64_t bytes) {
-        return [&losses, all, bytes](const Rungs& rungs) { return scaled(bytes, recordsLeft(losses, all, rungs)); };
+    const auto records = [](const LossSteps& steps, uint32_t g, uint8_t from, uint8_t to) {
+        return steps.step(g, from, to).bytes;
+    };
+    const RecordBytes now = recordsNow(losses);
+    const auto left = [&now](uint64_t bytes) {
+        return [now, bytes](const RecordBytes& then) { return scaled(bytes, recordsLeft(now, then)); };
     };
     if (profile.budget_dynamic > 0) limits.push_back({profile.budget_dynamic, left(cost.dynamic), records});
     const uint64_t stays = cost.base_lightmap + cost.global_grid + cost.local_grids;
     if (profile.budget_total > 0)
-        limits.push_back(
-            {profile.budget_total,
-             [stays, rest = left(cost.dynamic + cost.ancillary)](const Rungs& rungs) { return stays + rest(rungs); },
-             records});
+        limits.push_back({profile.budget_total,
+                          [stays, rest = left(cost.dynamic + cost.ancillary)](const RecordBytes& then) {
+                              return stays + rest(then);
+                          },
+                          records});
     const auto first_door =
         static_cast<uint32_t>(std::ranges::count(pack.elements, ElementKind::LightSet, &Element::kind));
     for (const ElementCost& e : cost.elements) {
         if (profile.budget_per_element == 0) break;
-        const auto of_element = [&losses, e, first_door](uint32_t g, uint8_t from, uint8_t to) {
-            if (e.element >= first_door) return losses.doorBytes(g, from, to, e.element - first_door);
-            return g == 1 + e.element ? losses.step(g, from, to).bytes : uint64_t{0};
+        const auto saved_by = [e, first_door](const LossSteps& steps, uint32_t g, uint8_t from, uint8_t to) {
+            if (e.element >= first_door) return steps.doorBytes(g, from, to, e.element - first_door);
+            return g == 1 + e.element ? steps.step(g, from, to).bytes : uint64_t{0};
+        };
+        const auto of_element = [e, first_door](const RecordBytes& held) {
+            const bool door = e.element >= first_door;
+            const auto& all = door ? held.by_door : held.by_group;
+            const size_t index = door ? e.element - first_door : 1 + e.element;
+            return index < all.size() ? all[index] : uint64_t{0};
         };
         limits.push_back({profile.budget_per_element,
-                          [of_element, e](const Rungs& rungs) {
-                              const uint64_t texels = e.bytes - e.probe_bytes;
-                              uint64_t stay = texels;
-                              for (uint32_t g = 0; g < rungs.size(); ++g) stay -= of_element(g, 0, rungs[g]);
+                          [of_element, e, before = of_element(now)](const RecordBytes& then) {
+                              const uint64_t texels = e.bytes - e.probe_bytes, more = texels + of_element(then);
+                              const uint64_t stay = more - std::min(more, before);
                               return stay + (texels > 0 ? scaled(e.probe_bytes, ratio(stay, texels)) : e.probe_bytes);
                           },
-                          of_element});
+                          saved_by});
     }
     return limits;
 }
 
-const Limit* exceeded(const std::vector<Limit>& limits, const Rungs& rungs) {
-    const auto it = std::ranges::find_if(limits, [&](const Limit& l) { return l.bytes(rungs) > l.budget; });
+const Limit* exceeded(const LossTable& losses, const std::vector<Limit>& limits, const Rungs& rungs) {
+    if (limits.empty()) return nullptr;
+    const RecordBytes then = losses.bytes(rungs);
+    const auto it = std::ranges::find_if(limits, [&](const Limit& l) { return l.bytes(then) > l.budget; });
     return it == limits.end() ? nullptr : &*it;
 }
 
@@ -107,14 +118,15 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                const std::vector<Limit>& limits, const Rungs& rungs) {
     Remedy remedy;
     const Loss loss = losses.loss(rungs);
-    remedy.saves = scaled(cost.dynamic, 1 - recordsLeft(losses, texelRecords(losses), rungs));
+    remedy.saves = scaled(cost.dynamic, std::max(0.0, 1 - recordsLeft(recordsNow(losses), losses.bytes(rungs))));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
-    remedy.fits = exceeded(limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
+    remedy.fits =
+        exceeded(losses, limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     for (uint32_t g = 1; g < rungs.size(); ++g) {
         if (rungs[g] == 0) continue;
         const float from = thresholdOf(pack, profile, g);
-        if (!(from < threshold_max)) continue;
+        if (!(from > 0 && from < threshold_max)) continue;  // what is stored whole has no multiples
         remedy.changes.push_back({std::string(set_threshold_prefix) + pack.elements[g - 1].name, from,
                                   std::min(threshold_max, threshold_rungs[rungs[g]] * from)});
     }
@@ -124,15 +136,16 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
 // Always the step that loses the least light for the bytes that the exceeded budget is over by.
 Rungs greedy(const LossTable& losses, const std::vector<Limit>& limits) {
     Rungs rungs(losses.groupCount(), 0);
-    while (const Limit* limit = exceeded(limits, rungs)) {
+    LossSteps steps = losses.steps(rungs);
+    while (const Limit* limit = exceeded(losses, limits, rungs)) {
         uint32_t best_group = 0;
         uint8_t best_rung = 0;
         double best = INFINITY;
         for (uint32_t g = 1; g < rungs.size(); ++g)
             for (auto r = static_cast<uint8_t>(rungs[g] + 1); r < threshold_rungs.size(); ++r) {
-                const uint64_t saved = limit->saved_by(g, rungs[g], r);
+                const uint64_t saved = limit->saved_by(steps, g, rungs[g], r);
                 const double price =
-                    losses.step(g, rungs[g], r).error / static_cast<double>(std::max<uint64_t>(saved, 1));
+                    steps.step(g, rungs[g], r).error / static_cast<double>(std::max<uint64_t>(saved, 1));
                 if (saved == 0 || !(price < best)) continue;
                 best = price;
                 best_group = g;
@@ -140,6 +153,7 @@ Rungs greedy(const LossTable& losses, const std::vector<Limit>& limits) {
             }
         if (best_rung == 0) break;
         rungs[best_group] = best_rung;
+        if (losses.isLimited()) steps = losses.steps(rungs);
     }
     return rungs;
 }
@@ -150,7 +164,7 @@ Rungs firstFitting(const LossTable& losses, const std::vector<Limit>& limits, ui
     for (uint8_t r = 1; r < threshold_rungs.size(); ++r) {
         for (uint32_t g = 1; g < rungs.size(); ++g)
             if (group == no_index || g == group) rungs[g] = r;
-        if (!exceeded(limits, rungs)) break;
+        if (!exceeded(losses, limits, rungs)) break;
     }
     return rungs;
 }
@@ -320,7 +334,7 @@ bool mayFit(const PackData& pack, PackCost cost, Profile profile, const LossTabl
     cost.ancillary = scaled(cost.ancillary, left.charts);
     profile.budget_per_element = scaled(profile.budget_per_element, 1 / left.charts);
     const Rungs highest(losses.groupCount(), static_cast<uint8_t>(threshold_rungs.size() - 1));
-    return !baseIsOver(cost, profile) && !exceeded(limitsOf(pack, cost, profile, losses), highest);
+    return !baseIsOver(cost, profile) && !exceeded(losses, limitsOf(pack, cost, profile, losses), highest);
 }
 
 }  // namespace
@@ -352,7 +366,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
     add(byProbes(pack, cost, profile, losses));
     add(byAll(pack, cost, profile, losses, 0));
     add(byLocalProbes(pack, cost, profile));
-    if (!baseIsOver(cost, profile) && exceeded(limits, Rungs(losses.groupCount(), 0))) {
+    if (!baseIsOver(cost, profile) && exceeded(losses, limits, Rungs(losses.groupCount(), 0))) {
         const auto by = [&](const Rungs& rungs) { add(byRungs(pack, cost, profile, losses, limits, rungs)); };
         by(greedy(losses, limits));
         by(firstFitting(losses, limits, no_index));

@@ -2,14 +2,14 @@
 
 #include <bake/sampling.h>
 #include <pack/pack_data.h>
+#include <pipeline/light_error.h>
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace dimmer::cook {
 namespace {
-
-constexpr float floor_share = 0.01f;  // of the mean light, as in `dimmer verify`
 
 uint8_t lostAt(const ReceiverLight& light, float threshold) {
     if (!std::isfinite(light.keep) || !(threshold > 0)) return threshold_rungs.size();
@@ -24,8 +24,20 @@ bool isLit(const Term& term, bool open) {
     return open ? term.doors_closed.empty() : term.doors_open.empty();
 }
 
+uint64_t areaOf(glm::uvec2 size) {
+    return uint64_t{size.x} * size.y;
+}
+
+std::vector<uint32_t> copiesOf(const Texels& texels) {
+    std::vector<uint32_t> copies(texels.size(), 1);
+    for (const FillTexel& fill : texels.fills) ++copies[fill.source];
+    return copies;
+}
+
+}  // namespace
+
 // All light of one state of the doors.
-struct StateLight {
+struct LossTable::StateLight {
     std::vector<float> lux;  // luminance per receiver
     float floor_lux = 0;
 
@@ -40,18 +52,6 @@ struct StateLight {
     }
     double above(size_t i) const { return static_cast<double>(lux[i] + floor_lux); }
 };
-
-uint64_t areaOf(glm::uvec2 size) {
-    return uint64_t{size.x} * size.y;
-}
-
-std::vector<uint32_t> copiesOf(const Texels& texels) {
-    std::vector<uint32_t> copies(texels.size(), 1);
-    for (const FillTexel& fill : texels.fills) ++copies[fill.source];
-    return copies;
-}
-
-}  // namespace
 
 LossTable::TexelsLeft LossTable::texelsLeft(double factor) const {
     if (sizes_.charts.empty()) return {1 / (factor * factor), 1 / (factor * factor)};
@@ -77,8 +77,12 @@ ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_
     return out;
 }
 
-LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, ChartSizes sizes)
-    : copies_(copiesOf(texels)), sizes_(std::move(sizes)) {
+LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, uint32_t overlap_max,
+                     ChartSizes sizes)
+    : terms_(baked.terms),
+      overlap_max_(overlap_max == 0 ? UINT32_MAX : overlap_max),
+      copies_(copiesOf(texels)),
+      sizes_(std::move(sizes)) {
     uint64_t fixed = 0, all = 0;
     for (size_t i = 0; i < sizes_.charts.size(); ++i) {
         const uint64_t area = areaOf(sizes_.charts[i]);
@@ -86,47 +90,85 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
         fixed += sizes_.fixed[i] ? area : 0;
     }
     fixed_texels_ = static_cast<double>(fixed) / static_cast<double>(std::max<uint64_t>(all, 1));
-    uint32_t doors = 0;
-    for (const Term& term : baked.terms) {
-        steps_.resize(std::max<size_t>(steps_.size(), term.group + 1));
+    for (const Term& term : terms_) {
+        group_count_ = std::max(group_count_, term.group + 1);
         for (const auto* list : {&term.doors_open, &term.doors_closed})
-            for (const uint32_t door : *list) doors = std::max(doors, door + 1);
+            for (const uint32_t door : *list) door_count_ = std::max(door_count_, door + 1);
     }
-    for (auto& group : steps_)
-        for (Step& step : group) step.door_bytes.resize(doors);
+    const std::vector<float> lux = listRecords(baked, thresholds);
     std::array<StateLight, 2> states = {StateLight(texels.size()), StateLight(texels.size())};
-    std::vector<double> energy(steps_.size());
-    double texel_count = 0;
-    for (size_t i = 0; i < texels.size(); ++i) {
-        texel_count += copies_[i];
-        for (const ReceiverLight& l : baked.light.row(i)) {
-            const float part = luminance(l.light.irradiance_lux);
-            for (const bool open : {false, true})
-                if (isLit(baked.terms[l.term], open)) states[open].lux[i] += part;
-            energy[baked.terms[l.term].group] += static_cast<double>(part * texels.area_m2[i]);
+    const auto add = [&](uint32_t receiver, uint32_t term, float part) {
+        for (const bool open : {false, true})
+            if (isLit(terms_[term], open)) states[open].lux[receiver] += part;
+    };
+    for (uint32_t i = 0; i < texels.size(); ++i)
+        for (const ReceiverLight& l : baked.light.row(i))
+            if (l.term == always_group) add(i, l.term, luminance(l.light.irradiance()));
+    forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t k) { add(r.receiver, r.term, lux[k]); });
+    for (StateLight& state : states) state.setFloor(copies_);
+    weigh(texels, lux, states);
+    measureCurvature(texels, states[0].lux, states[0].floor_lux);
+}
+
+std::vector<float> LossTable::listRecords(const Baked& baked, std::span<const float> thresholds) {
+    std::vector<float> lux;
+    std::vector<std::pair<float, Record>> row;
+    for (uint32_t i = 0; i < baked.light.rows(); ++i) {
+        row.clear();
+        for (const ReceiverLight& l : baked.light.row(i))
+            if (l.term != always_group)
+                row.push_back(
+                    {luminance(l.light.irradiance()), {i, l.term, 0, 0, lostAt(l, thresholds[terms_[l.term].group])}});
+        // As limitOverlap() has them: of equals the earlier term.
+        std::ranges::stable_sort(row, std::greater{}, [](const auto& entry) { return entry.first; });
+        for (const auto& [light, record] : row) {
+            lux.push_back(light);
+            records_.push_back(record);
         }
     }
-    for (StateLight& state : states) state.setFloor(copies_);
-    for (uint32_t i = 0; i < texels.size(); ++i)
-        for (const ReceiverLight& l : baked.light.row(i)) {
-            if (l.term == always_group) continue;
-            const Term& term = baked.terms[l.term];
-            const uint8_t lost = lostAt(l, thresholds[term.group]);
-            records_.push_back({i, static_cast<uint16_t>(term.group), lost});
-            if (lost == threshold_rungs.size()) continue;
-            Step& step = steps_[term.group][lost];
-            const auto part = static_cast<double>(luminance(l.light.irradiance_lux));
-            const uint64_t bytes = copies_[i] * sizeof(TexelRecord);
-            step.loss.bytes += bytes;
-            for (const bool open : {false, true})
-                if (const StateLight& state = states[open]; isLit(term, open) && state.above(i) > 0)
-                    step.loss.error += part / state.above(i) * copies_[i] / (2 * texel_count);
-            if (energy[term.group] > 0)
-                step.loss.energy += part * static_cast<double>(texels.area_m2[i]) / energy[term.group];
-            for (const auto* list : {&term.doors_open, &term.doors_closed})
-                for (const uint32_t door : *list) step.door_bytes[door] += bytes;
-        }
-    measureCurvature(texels, states[0].lux, states[0].floor_lux);
+    return lux;
+}
+
+void LossTable::forKept(const Rungs& rungs, auto&& each) const {
+    uint32_t receiver = UINT32_MAX, count = 0;
+    for (size_t k = 0; k < records_.size(); ++k) {
+        const Record& r = records_[k];
+        if (r.receiver != receiver) count = 0;
+        receiver = r.receiver;
+        if (r.lost_at <= rungs[groupOf(r)] || count == overlap_max_) continue;
+        ++count;
+        each(r, k);
+    }
+}
+
+void LossTable::weigh(const Texels& texels, std::span<const float> lux, std::span<const StateLight> states) {
+    double texel_count = 0;
+    for (const uint32_t copies : copies_) texel_count += copies;
+    std::vector<double> energy(groupCount());
+    const auto energyOf = [&](const Record& r, size_t k) {
+        return static_cast<double>(lux[k] * texels.area_m2[r.receiver]);
+    };
+    forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t k) { energy[groupOf(r)] += energyOf(r, k); });
+    for (size_t k = 0; k < records_.size(); ++k) {
+        Record& r = records_[k];
+        double error = 0;
+        for (const bool open : {false, true})
+            if (const StateLight& state = states[open]; isLit(terms_[r.term], open) && state.above(r.receiver) > 0)
+                error +=
+                    static_cast<double>(lux[k]) / state.above(r.receiver) * copies_[r.receiver] / (2 * texel_count);
+        r.error = static_cast<float>(error);
+        if (const double all = energy[groupOf(r)]; all > 0) r.energy = static_cast<float>(energyOf(r, k) / all);
+    }
+}
+
+LossSteps LossTable::steps(const Rungs& rungs) const {
+    LossSteps sum(groupCount(), door_count_);
+    forKept(rungs, [&](const Record& r, size_t) {
+        const Loss loss{copies_[r.receiver] * sizeof(TexelRecord), static_cast<double>(r.error),
+                        static_cast<double>(r.energy)};
+        if (r.lost_at < threshold_rungs.size()) sum.add(groupOf(r), r.lost_at, loss, terms_[r.term]);
+    });
+    return sum;
 }
 
 // Over neighbours on the pages, which charts' padding continues; |left + right - 2 here| / 2 along both axes.
@@ -156,7 +198,56 @@ void LossTable::measureCurvature(const Texels& texels, const std::vector<float>&
     curvature_ = count > 0 ? sum / count : 0;
 }
 
-Loss LossTable::step(uint32_t group, uint8_t from, uint8_t to) const {
+Loss LossTable::loss(const Rungs& rungs) const {
+    struct Held {
+        uint64_t bytes = 0;
+        double error = 0;
+        std::vector<double> energy;
+    };
+    const auto held = [&](const Rungs& at) {
+        Held sum{.energy = std::vector<double>(groupCount())};
+        forKept(at, [&](const Record& r, size_t) {
+            sum.bytes += copies_[r.receiver] * sizeof(TexelRecord);
+            sum.error += static_cast<double>(r.error);
+            sum.energy[groupOf(r)] += static_cast<double>(r.energy);
+        });
+        return sum;
+    };
+    const Held before = held(Rungs(groupCount(), 0)), after = held(rungs);
+    Loss loss{before.bytes - after.bytes, std::max(0.0, before.error - after.error), 0};
+    for (uint32_t g = 0; g < groupCount(); ++g) loss.energy = std::max(loss.energy, before.energy[g] - after.energy[g]);
+    return loss;
+}
+
+RecordBytes LossTable::bytes(const Rungs& rungs) const {
+    RecordBytes sum{0, std::vector<uint64_t>(groupCount()), std::vector<uint64_t>(door_count_)};
+    uint32_t based = UINT32_MAX;
+    forKept(rungs, [&](const Record& r, size_t) {
+        const uint64_t bytes = copies_[r.receiver] * sizeof(TexelRecord);
+        sum.dynamic += based == r.receiver ? bytes : 2 * bytes;  // with the receiver's base
+        based = r.receiver;
+        sum.by_group[groupOf(r)] += bytes;
+        for (const auto* list : {&terms_[r.term].doors_open, &terms_[r.term].doors_closed})
+            for (const uint32_t door : *list) sum.by_door[door] += bytes;
+    });
+    return sum;
+}
+
+LossSteps::LossSteps(uint32_t groups, uint32_t doors) : steps_(groups) {
+    for (auto& group : steps_)
+        for (Step& step : group) step.door_bytes.resize(doors);
+}
+
+void LossSteps::add(uint32_t group, uint8_t lost_at, const Loss& loss, const Term& term) {
+    Step& step = steps_[group][lost_at];
+    step.loss.bytes += loss.bytes;
+    step.loss.error += loss.error;
+    step.loss.energy += loss.energy;
+    for (const auto* list : {&term.doors_open, &term.doors_closed})
+        for (const uint32_t door : *list) step.door_bytes[door] += loss.bytes;
+}
+
+Loss LossSteps::step(uint32_t group, uint8_t from, uint8_t to) const {
     Loss sum;
     for (uint8_t r = from + 1; r <= to; ++r) {
         sum.bytes += steps_[group][r].loss.bytes;
@@ -166,34 +257,11 @@ Loss LossTable::step(uint32_t group, uint8_t from, uint8_t to) const {
     return sum;
 }
 
-Loss LossTable::loss(const Rungs& rungs) const {
-    Loss sum;
-    for (uint32_t g = 0; g < groupCount(); ++g) {
-        const Loss own = step(g, 0, rungs[g]);
-        sum.bytes += own.bytes;
-        sum.error += own.error;
-        sum.energy = std::max(sum.energy, own.energy);
-    }
-    return sum;
-}
-
-uint64_t LossTable::doorBytes(uint32_t group, uint8_t from, uint8_t to, uint32_t door) const {
+uint64_t LossSteps::doorBytes(uint32_t group, uint8_t from, uint8_t to, uint32_t door) const {
     uint64_t sum = 0;
     for (uint8_t r = from + 1; r <= to; ++r)
         if (door < steps_[group][r].door_bytes.size()) sum += steps_[group][r].door_bytes[door];
     return sum;
-}
-
-uint64_t LossTable::dynamicBytes(const Rungs& rungs) const {
-    uint64_t texels = 0;
-    uint32_t based = UINT32_MAX;
-    for (const Record& r : records_) {
-        if (r.lost_at <= rungs[r.group]) continue;
-        texels += copies_[r.receiver];
-        if (based != r.receiver) texels += copies_[r.receiver];
-        based = r.receiver;
-    }
-    return texels * sizeof(TexelRecord);
 }
 
 }  // namespace dimmer::cook

@@ -24,6 +24,12 @@ struct Loss {
     double energy = 0;   // share of the groups' stored light
 };
 
+// What records of texels take.
+struct RecordBytes {
+    uint64_t dynamic = 0;                     // all that costs PackCost::dynamic, bases included
+    std::vector<uint64_t> by_group, by_door;  // without bases; of terms of the group, or about the door
+};
+
 // What a profile's density changes: the sizes of charts, but of those whose meshes state a density of their own.
 struct ChartSizes {
     uint32_t page_size = 0;
@@ -32,22 +38,43 @@ struct ChartSizes {
 };
 ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_size);
 
-// Records of a bake by the rung at which they go. A receiver counts once for every texel that shows it. Errors are
+// Of the records that receivers hold at some rungs, those that go at each higher one; not what comes back in their
+// place, which depends on all groups' rungs.
+class LossSteps {
+   public:
+    LossSteps(uint32_t groups, uint32_t doors);
+    void add(uint32_t group, uint8_t lost_at, const Loss& loss, const Term& term);
+    Loss step(uint32_t group, uint8_t from, uint8_t to) const;
+    // Bytes of the step that terms about the door hold.
+    uint64_t doorBytes(uint32_t group, uint8_t from, uint8_t to, uint32_t door) const;
+
+   private:
+    struct Step {
+        Loss loss;
+        std::vector<uint64_t> door_bytes;
+    };
+    std::vector<std::array<Step, threshold_rungs.size()>> steps_;
+};
+
+// Records of a bake by the rung at which they go. Of those that are left, a receiver keeps as many as it may hold, the
+// brightest: where one goes, another may come back. A receiver counts once for every texel that shows it. Errors are
 // those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that
 // 1 %.
 class LossTable {
    public:
     LossTable() = default;
-    // `thresholds`: per light group, those of the bake.
-    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, ChartSizes sizes);
+    // `baked`: before limitOverlap(), which then has `overlap_max`. `thresholds`: per light group, those of the bake.
+    LossTable(const Baked& baked, const Texels& texels, std::span<const float> thresholds, uint32_t overlap_max,
+              ChartSizes sizes);
 
     // From the present thresholds to `rungs`.
     Loss loss(const Rungs& rungs) const;
-    Loss step(uint32_t group, uint8_t from, uint8_t to) const;
-    // Bytes of the step that terms about the door hold.
-    uint64_t doorBytes(uint32_t group, uint8_t from, uint8_t to, uint32_t door) const;
-    // All that costs PackCost::dynamic, bases included. Exact.
-    uint64_t dynamicBytes(const Rungs& rungs) const;
+    // At `rungs`. Exact.
+    RecordBytes bytes(const Rungs& rungs) const;
+    // To choose by at `rungs`.
+    LossSteps steps(const Rungs& rungs) const;
+    // Whether receivers hold only so many records: then steps() at other rungs are others.
+    bool isLimited() const { return overlap_max_ != UINT32_MAX; }
     // Mean relative error of texels `factor` times as long, against those there are: of second differences of the light
     // along the pages, an eighth of which a box of a texel and bilinear filtering lose where light is smooth.
     double densityError(double factor) const { return (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4; }
@@ -58,23 +85,28 @@ class LossTable {
     };
     TexelsLeft texelsLeft(double factor) const;
 
-    uint32_t groupCount() const { return static_cast<uint32_t>(steps_.size()); }
+    uint32_t groupCount() const { return group_count_; }
 
    private:
     struct Record {
-        uint32_t receiver;
-        uint16_t group;
-        uint8_t lost_at;  // the first rung at which it goes; threshold_rungs.size(): never
+        uint32_t receiver, term;
+        float error, energy;  // what goes with it, see Loss
+        uint8_t lost_at;      // the first rung at which it goes; threshold_rungs.size(): never
     };
-    struct Step {
-        Loss loss;
-        std::vector<uint64_t> door_bytes;
-    };
+    struct StateLight;
+    // Calls each(record, its number) for what receivers hold at `rungs`.
+    void forKept(const Rungs& rungs, auto&& each) const;
+    uint32_t groupOf(const Record& record) const { return terms_[record.term].group; }
+    // Returns the records' light.
+    std::vector<float> listRecords(const Baked& baked, std::span<const float> thresholds);
+    void weigh(const Texels& texels, std::span<const float> lux, std::span<const StateLight> states);
     void measureCurvature(const Texels& texels, const std::vector<float>& lux, float floor_lux);
 
-    std::vector<Record> records_;                                  // by receiver
-    std::vector<uint32_t> copies_;                                 // texels that show a receiver
-    std::vector<std::array<Step, threshold_rungs.size()>> steps_;  // per group: what goes at each rung
+    std::vector<Term> terms_;
+    uint32_t group_count_ = 0, door_count_ = 0;
+    uint32_t overlap_max_ = UINT32_MAX;
+    std::vector<Record> records_;   // by receiver, the brightest first
+    std::vector<uint32_t> copies_;  // texels that show a receiver
     double curvature_ = 0;
     ChartSizes sizes_;
     double fixed_texels_ = 0;  // share of charts' texels

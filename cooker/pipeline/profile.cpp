@@ -152,11 +152,6 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     return {};
 }
 
-// The shortest decimal that reads back as the same float: 0.01, not 0.009999999776482582.
-double shortDecimal(float value) {
-    return std::stod(fmt::format("{}", value));
-}
-
 }  // namespace
 
 const Quality* Profile::quality(const std::string& name) const {
@@ -174,18 +169,7 @@ std::string Profile::settingsJson(const std::string& quality) const {
     for (const Setting& s : settingsOf(copy)) {
         if (s.key.starts_with("bake.") && !s.key.starts_with("bake." + quality + ".")) continue;
         const auto from = origin.find(s.key);
-        std::visit(
-            [&](auto* v) {
-                auto& setting = out[s.key];
-                if constexpr (std::is_same_v<decltype(v), float*>)
-                    setting["value"] = shortDecimal(*v);
-                else if constexpr (std::is_enum_v<std::remove_pointer_t<decltype(v)>>)
-                    setting["value"] = nameOf(*v);
-                else
-                    setting["value"] = *v;
-                setting["from"] = from == origin.end() ? "default" : from->second;
-            },
-            s.target);
+        out[s.key] = {{"value", valueOf(s)}, {"from", from == origin.end() ? "default" : from->second}};
     }
     for (const auto& [set, share] : set_thresholds) {
         const std::string key = std::string(set_threshold_prefix) + set;

@@ -16,7 +16,7 @@ namespace dimmer::cook {
 const char* nameOf(ColorFormat format);
 const char* nameOf(DirectionModel model);
 
-// Whether a cook bakes the global grid. Auto: where something in the level moves; see wantsGrid() in cook.h.
+// Whether a cook bakes the global grid. Auto: where something in the level moves; see wantsGrid() in cook_settings.h.
 enum class GridMode { Auto, On, Off };
 
 const char* nameOf(GridMode mode);

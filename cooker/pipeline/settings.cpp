@@ -102,7 +102,7 @@ constexpr const char* threshold_what =
     "directly. Higher saves memory and update time and loses faint light; 0.01 is hardly seen";
 
 json schemaOf(const Setting& s) {
-    json out = {{"description", s.what}};
+    json out = {{"description", s.what}, {"default", valueOf(s)}};
     if (std::holds_alternative<ColorFormat*>(s.target))
         out["enum"] = color_formats;
     else if (std::holds_alternative<DirectionModel*>(s.target))
@@ -219,6 +219,24 @@ std::vector<Setting> settingsOf(Profile& p) {
     return list;
 }
 
+json valueOf(const Setting& setting) {
+    return std::visit(
+        [](const auto* v) -> json {
+            using Value = std::remove_cvref_t<decltype(*v)>;
+            if constexpr (std::is_same_v<Value, float>)
+                return shortDecimal(*v);
+            else if constexpr (std::is_enum_v<Value>)
+                return nameOf(*v);
+            else
+                return *v;
+        },
+        setting.target);
+}
+
+double shortDecimal(float value) {
+    return std::stod(fmt::format("{}", value));
+}
+
 Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& settings, const std::string& key,
                              const json& value, const std::string& source) {
     if (key.starts_with(set_threshold_prefix) && key.size() > set_threshold_prefix.size()) {
@@ -250,6 +268,8 @@ std::string settingsSchema() {
     using ordered = nlohmann::ordered_json;
     ordered schema = {{"$schema", "https://json-schema.org/draft/2020-12/schema"},
                       {"title", "A profile of the cooker"},
+                      {"description",
+                       "What a profile does not set is as in the one that it extends; \"default\" is what desktop has"},
                       {"type", "object"},
                       {"additionalProperties", false}};
     ordered& top = schema["properties"];
@@ -258,8 +278,8 @@ std::string settingsSchema() {
     top["extends"] = {
         {"type", "string"},
         {"description", "what this profile changes: a shipped profile's name or a file beside it; default: desktop"}};
-    Profile profile;
-    for (const Setting& s : settingsOf(profile)) {
+    Profile desktop = loadProfile("desktop").value();
+    for (const Setting& s : settingsOf(desktop)) {
         ordered* object = &schema;
         size_t begin = 0;
         for (size_t dot; (dot = s.key.find('.', begin)) != std::string::npos; begin = dot + 1) {

@@ -23,6 +23,12 @@ struct Setting {
 // Those of `profile`, whose members the targets point into.
 std::vector<Setting> settingsOf(Profile& profile);
 
+// What it is set to, as JSON: a number by shortDecimal(), a choice by its name.
+nlohmann::json valueOf(const Setting& setting);
+
+// The shortest decimal that reads back as the same float: 0.01, not 0.009999999776482582.
+double shortDecimal(float value);
+
 // "records.thresholds.NAME" is a setting for every light set.
 inline constexpr std::string_view set_threshold_prefix = "records.thresholds.";
 
@@ -35,7 +41,8 @@ Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& setti
 Expected<void> assignText(Profile& profile, const std::string& text, const std::string& source,
                           const std::string& origin);
 
-// The JSON schema of profiles (draft 2020-12): profiles/schema.json.
+// The JSON schema of profiles (draft 2020-12): profiles/schema.json. Its defaults are those of the profile that all
+// others start from.
 std::string settingsSchema();
 
 }  // namespace dimmer::cook

@@ -1,4 +1,4 @@
-// Seconds of a progress's stages, in the order in which they first came.
+// Times: of a progress's stages, in the order in which they first came, and of blocks.
 #pragma once
 
 #include <bake/progress.h>
@@ -44,6 +44,19 @@ class StageTimer final : public Progress {
     Progress& progress_;
     StageSeconds& seconds_;
     std::string name_;
+    std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// Adds the seconds of its own life.
+class Stopwatch {
+   public:
+    explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+    ~Stopwatch() { seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+    Stopwatch(const Stopwatch&) = delete;
+    Stopwatch& operator=(const Stopwatch&) = delete;
+
+   private:
+    double& seconds_;
     std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 

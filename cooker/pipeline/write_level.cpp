@@ -225,7 +225,7 @@ class LevelWriter {
     // The file's material; a single-sided copy where each side has texels of its own. None: glTF's default.
     std::optional<size_t> materialFor(uint32_t material, bool lit) {
         const bool double_sided = level_.scene.materials[material].double_sided;
-        material = level_.copy_of[material];
+        material = level_.scales.copy_of[material];
         if (material >= source_.model.materials.size()) return std::nullopt;
         if (!lit || !double_sided) return material;
         const auto [it, fresh] = single_sided_.try_emplace(material, document_.json["materials"].size());

@@ -4,6 +4,7 @@
 #include <pipeline/budget.h>
 #include <pipeline/contribution_text.h>
 #include <pipeline/heat_map.h>
+#include <pipeline/human_bytes.h>
 #include <pipeline/profile.h>
 #include <report/page_pictures.h>
 
@@ -71,11 +72,6 @@ std::string escaped(std::string_view text) {
     return out;
 }
 
-std::string bytesText(uint64_t bytes) {
-    return bytes < 1000000 ? fmt::format("{:.1f} kB", static_cast<double>(bytes) / 1e3)
-                           : fmt::format("{:.2f} MB", static_cast<double>(bytes) / 1e6);
-}
-
 std::string percent(double share) {
     return fmt::format("{:.2f} %", 100 * share);
 }
@@ -119,7 +115,7 @@ class Report {
             "{} clusters, exposure {}{}</p>\n",
             escaped(input_.title), d_.page_count, d_.page_count == 1 ? "page" : "pages", d_.page_width, d_.page_height,
             count(ElementKind::LightSet), count(ElementKind::Door), d_.contributions.size(), d_.clusters.size(),
-            d_.exposure, input_.file_bytes ? ", file " + bytesText(input_.file_bytes) : "");
+            d_.exposure, input_.file_bytes ? ", file " + humanBytes(input_.file_bytes) : "");
     }
 
     size_t count(ElementKind kind) const {
@@ -130,8 +126,8 @@ class Report {
         const uint64_t whole = limit > 0 ? limit : std::max<uint64_t>(largest, 1);
         const double share = static_cast<double>(bytes) / static_cast<double>(whole);
         body_ += bar(label, share,
-                     limit > 0 ? fmt::format("{} of {} ({:.0f} %)", bytesText(bytes), bytesText(limit), 100 * share)
-                               : bytesText(bytes) + ", no limit",
+                     limit > 0 ? fmt::format("{} of {} ({:.0f} %)", humanBytes(bytes), humanBytes(limit), 100 * share)
+                               : humanBytes(bytes) + ", no limit",
                      share > 1);
     }
 
@@ -164,7 +160,7 @@ class Report {
         for (const ElementCost& e : by_size) {
             const Element& element = d_.elements[e.element];
             body_ +=
-                fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}\n", escaped(elementName(element)), bytesText(e.bytes),
+                fmt::format("<tr><td>{}<td>{}<td>{}<td>{}<td>{}\n", escaped(elementName(element)), humanBytes(e.bytes),
                             e.receivers, element.kind == ElementKind::Door ? "" : fmt::format("{}", element.max_weight),
                             element.kind == ElementKind::Door ? "" : percent(static_cast<double>(dropped(e.element))));
         }

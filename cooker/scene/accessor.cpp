@@ -155,7 +155,7 @@ void copyElement(const unsigned char* from, const tinygltf::Accessor& accessor, 
 }
 
 Expected<void> applySparse(const ImportContext& context, const tinygltf::Accessor& accessor, Layout layout,
-                           const std::string& owner, std::vector<float>& values) {
+                           const UsedVertices& used, const std::string& owner, std::vector<float>& values) {
     const auto& sparse = accessor.sparse;
     if (sparse.count < 1 || static_cast<size_t>(sparse.count) > accessor.count || sparse.indices.byteOffset < 0 ||
         sparse.values.byteOffset < 0 || !isIndexType(sparse.indices.componentType))
@@ -174,47 +174,63 @@ Expected<void> applySparse(const ImportContext& context, const tinygltf::Accesso
                                  fmt::format("its sparse accessor sets element {} of {}. Export the level without "
                                              "sparse accessors.",
                                              target, accessor.count));
-        copyElement((*elements)[i], accessor, layout, &values[target * layout.components]);
+        if (const size_t at = used.number_of[target]; at != UsedVertices::unused)
+            copyElement((*elements)[i], accessor, layout, &values[at * layout.components]);
     }
     return {};
 }
 
-Expected<void> readDense(const ImportContext& context, const tinygltf::Accessor& accessor, Layout layout,
-                         const std::string& owner, std::vector<float>& values) {
-    if (accessor.bufferView < 0) {
-        if (const auto ok = checkZeros(context, accessor, owner); !ok) return ok;
-        values.assign(accessor.count * layout.components, 0.0f);
-        return {};
-    }
-    const auto elements =
-        locate(context, accessor.bufferView, accessor.byteOffset, accessor.count, layout.bytes(), owner);
-    if (!elements) return std::unexpected(elements.error());
-    values.resize(accessor.count * layout.components);
-    for (size_t i = 0; i < elements->count; ++i)
-        copyElement((*elements)[i], accessor, layout, &values[i * layout.components]);
-    return {};
+// Where its elements lie; no data: a sparse accessor's zeros.
+Expected<StridedElements> denseElements(const ImportContext& context, const tinygltf::Accessor& accessor, Layout layout,
+                                        const std::string& owner) {
+    if (accessor.bufferView >= 0)
+        return locate(context, accessor.bufferView, accessor.byteOffset, accessor.count, layout.bytes(), owner);
+    if (const auto ok = checkZeros(context, accessor, owner); !ok) return std::unexpected(ok.error());
+    return StridedElements{nullptr, accessor.count, 0};
+}
+
+Layout layoutOf(const tinygltf::Accessor& accessor, Attribute attribute) {
+    return {attribute == Attribute::TexCoord ? 2u : 3u, componentBytes(accessor.componentType)};
+}
+
+std::string labelOf(const std::string& owner, Attribute attribute) {
+    return fmt::format("{}, {}", owner, attributeName(attribute));
 }
 
 }  // namespace
 
-Expected<std::vector<float>> readAttribute(const ImportContext& context, int index, Attribute attribute,
-                                           const std::string& owner) {
+Expected<size_t> countElements(const ImportContext& context, int index, Attribute attribute, const std::string& owner) {
     const tinygltf::Accessor& accessor = context.model.accessors[static_cast<size_t>(index)];
     if (const auto ok = checkType(context, accessor, attribute, owner); !ok) return std::unexpected(ok.error());
-    const Layout layout{attribute == Attribute::TexCoord ? 2u : 3u, componentBytes(accessor.componentType)};
-    const std::string where = fmt::format("{}, {}", owner, attributeName(attribute));
+    const auto elements = denseElements(context, accessor, layoutOf(accessor, attribute), labelOf(owner, attribute));
+    if (!elements) return std::unexpected(elements.error());
+    return elements->count;
+}
 
-    std::vector<float> values;
-    if (const auto ok = readDense(context, accessor, layout, where, values); !ok) return std::unexpected(ok.error());
+Expected<std::vector<float>> readAttribute(const ImportContext& context, int index, Attribute attribute,
+                                           const UsedVertices& used, const std::string& owner) {
+    const auto count = countElements(context, index, attribute, owner);
+    if (!count) return std::unexpected(count.error());
+    if (*count != used.number_of.size())
+        return context.error(owner, fmt::format("{} has {} elements, POSITION {}. Export the level again.",
+                                                attributeName(attribute), *count, used.number_of.size()));
+    const tinygltf::Accessor& accessor = context.model.accessors[static_cast<size_t>(index)];
+    const Layout layout = layoutOf(accessor, attribute);
+    const std::string where = labelOf(owner, attribute);
+    const auto elements = denseElements(context, accessor, layout, where);
+    if (!elements) return std::unexpected(elements.error());
+    std::vector<float> values(used.numbers.size() * layout.components, 0.0f);
+    for (size_t i = 0; i < used.numbers.size() && elements->data; ++i)
+        copyElement((*elements)[used.numbers[i]], accessor, layout, &values[i * layout.components]);
     if (accessor.sparse.isSparse)
-        if (const auto ok = applySparse(context, accessor, layout, where, values); !ok)
+        if (const auto ok = applySparse(context, accessor, layout, used, where, values); !ok)
             return std::unexpected(ok.error());
 
     const auto bad = std::ranges::find_if(values, [](float value) { return !std::isfinite(value); });
     if (bad != values.end())
         return context.error(where,
                              fmt::format("vertex {} is NaN or infinite. Repair the mesh in the editor that made it.",
-                                         static_cast<size_t>(bad - values.begin()) / layout.components));
+                                         used.numbers[static_cast<size_t>(bad - values.begin()) / layout.components]));
     return values;
 }
 

@@ -152,9 +152,9 @@ Expected<void> checkElementName(const ImportContext& context, const std::string&
                              fmt::format("'{}' is '{}', but a name needs a character, and none of ',', '=' and line "
                                          "breaks, nor blanks at its ends. Rename it.",
                                          key, name));
-    if (key == "dimmer_light_set" && (name == "all" || name.starts_with("door:")))
-        return context.error(owner, fmt::format("the light set's name '{}' has a meaning of its own where states are "
-                                                "written. Rename it.",
+    if (key == "dimmer_light_set" && (name == "all" || name == "always" || name.starts_with("door:")))
+        return context.error(owner, fmt::format("the light set's name '{}' has a meaning of its own where states "
+                                                "and contributions are written. Rename it.",
                                                 name));
     return {};
 }

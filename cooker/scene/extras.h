@@ -3,6 +3,7 @@
 
 #include <scene/import_context.h>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -44,6 +45,9 @@ class Extras {
     const ImportContext* context_;
     std::vector<Source> sources_;
 };
+
+// Of `dimmer_bake`, in the order of BakeMode.
+inline constexpr std::array<std::string_view, 3> bake_modes = {"indirect", "full", "none"};
 
 enum class ExtrasPlace { Node, Scene };
 

@@ -30,11 +30,18 @@ bool isGlb(std::span<const unsigned char> bytes) {
     return bytes.size() >= 4 && std::memcmp(bytes.data(), "glTF", 4) == 0;
 }
 
-// The GLB container (glTF 2.0 specification, "GLB File Format"): a 12-byte header, then chunks of 8 + length bytes.
-// Returns the JSON chunk. tinygltf's own check lets a last chunk reach 8 bytes past the end.
-Expected<std::string_view> glbJson(std::span<const unsigned char> bytes, const std::string& file) {
-    constexpr size_t header_bytes = 12, chunk_header_bytes = 8;
-    constexpr uint32_t json_chunk = 0x4E4F534A;
+// glTF 2.0 specification, "GLB File Format": a 12-byte header, then chunks of 8 + length bytes.
+constexpr size_t header_bytes = 12, chunk_header_bytes = 8;
+constexpr uint32_t json_chunk = 0x4E4F534A, binary_chunk = 0x004E4942;
+
+struct GlbParts {
+    std::string_view json;
+    std::span<const unsigned char> binary;  // its chunk, header included; empty: there is none, or nothing in it
+    bool only = true;                       // nothing else is in the file
+};
+
+// tinygltf's own check lets a last chunk reach 8 bytes past the end.
+Expected<GlbParts> glbParts(std::span<const unsigned char> bytes, const std::string& file) {
     const auto truncated = [&](std::string_view what) {
         return fail(ErrorCode::BadInput,
                     fmt::format("{}: the GLB file is truncated: {}. Export or copy it again.", file, what));
@@ -45,18 +52,35 @@ Expected<std::string_view> glbJson(std::span<const unsigned char> bytes, const s
     const size_t length = littleEndian32(bytes, 8);
     if (length < header_bytes + chunk_header_bytes || length > bytes.size())
         return truncated(fmt::format("its header says {} bytes, the file has {}", length, bytes.size()));
+    GlbParts parts;
     for (size_t offset = header_bytes; offset < length;) {
         if (length - offset < chunk_header_bytes) return truncated("it ends inside a chunk's header");
         const size_t chunk_bytes = littleEndian32(bytes, offset);
         if (chunk_bytes > length - offset - chunk_header_bytes)
             return truncated(fmt::format("the chunk at byte {} reaches past its end", offset));
-        offset += chunk_header_bytes + chunk_bytes;
+        const auto chunk = bytes.subspan(offset, chunk_header_bytes + chunk_bytes);
+        if (offset > header_bytes) {
+            const bool binary = parts.binary.empty() && chunk_bytes > 0 && littleEndian32(chunk, 4) == binary_chunk;
+            if (binary) parts.binary = chunk;
+            parts.only = parts.only && binary;
+        }
+        offset += chunk.size();
     }
     if (littleEndian32(bytes, header_bytes + 4) != json_chunk)
         return fail(ErrorCode::BadInput,
                     fmt::format("{}: the GLB file does not start with JSON. Export it again.", file));
-    return std::string_view(reinterpret_cast<const char*>(bytes.data()) + header_bytes + chunk_header_bytes,
-                            littleEndian32(bytes, header_bytes));
+    parts.json = std::string_view(reinterpret_cast<const char*>(bytes.data()) + header_bytes + chunk_header_bytes,
+                                  littleEndian32(bytes, header_bytes));
+    return parts;
+}
+
+// Without an empty binary chunk and those of types that are not known, which the parser refuses and glTF wants ignored.
+Bytes withoutOtherChunks(const Bytes& glb, const GlbParts& parts) {
+    const size_t json_end = header_bytes + chunk_header_bytes + parts.json.size();
+    Bytes out(glb.begin(), glb.begin() + static_cast<std::ptrdiff_t>(json_end));
+    out.insert(out.end(), parts.binary.begin(), parts.binary.end());
+    for (size_t i = 0; i < 4; ++i) out[8 + i] = static_cast<unsigned char>(out.size() >> 8 * i);
+    return out;
 }
 
 size_t deepestNesting(std::string_view json) {
@@ -100,8 +124,8 @@ ExternalFiles externalFiles(std::string_view gltf_json, std::string folder) {
             if (uri.starts_with("data:")) continue;
             std::string parsed = uri;
             std::ranges::replace(parsed, '+', ' ');
-            const std::string path = files.folder + "/" + percentDecoded(uri);
-            const auto [meant, first] = files.meant.try_emplace(files.folder + "/" + percentDecoded(parsed), path);
+            const std::string path = pathIn(files.folder, percentDecoded(uri));
+            const auto [meant, first] = files.meant.try_emplace(pathIn(files.folder, percentDecoded(parsed)), path);
             if (!first && meant->second != path) meant->second.clear();  // which one is asked for cannot be told
             if (list != std::string_view("buffers") || !file.contains("byteLength")) continue;
             if (!file["byteLength"].is_number_unsigned()) continue;
@@ -116,7 +140,7 @@ ExternalFiles externalFiles(std::string_view gltf_json, std::string folder) {
 // tinygltf looks for external files next to the level and then in the working directory. Only the first is meant:
 // a level must not depend on where the cooker was started.
 bool isBesideLevel(const std::string& path, void* files) {
-    return path.starts_with(static_cast<const ExternalFiles*>(files)->folder + "/");
+    return path.starts_with(pathIn(static_cast<const ExternalFiles*>(files)->folder, ""));
 }
 
 std::string meantPath(const std::string& path, void* files) {
@@ -147,6 +171,11 @@ bool keepEncoded(tinygltf::Image* image, int, std::string*, std::string*, int, i
     return true;
 }
 
+// The parser takes a data URI of a media type that it does not know for the name of a file.
+void decodeUnknownType(tinygltf::Image& image) {
+    if (image.image.empty() && decodeDataUri(image.uri, image.image)) image.uri.clear();
+}
+
 // The parser's messages may hold a whole data URI and line breaks.
 std::string oneLine(std::string text) {
     constexpr size_t length_max = 300;
@@ -168,7 +197,10 @@ Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, ExternalFiles file
             : parser.LoadASCIIFromString(&model, &message, &ignored, reinterpret_cast<const char*>(bytes.data()), size,
                                          files.folder);
     // Some errors are reported by message alone, with the offending part left out.
-    if (parsed && message.empty()) return model;
+    if (parsed && message.empty()) {
+        for (tinygltf::Image& image : model.images) decodeUnknownType(image);
+        return model;
+    }
     return fail(ErrorCode::BadInput, fmt::format("{}: is not a usable glTF file: {}. Export it again, or have a glTF "
                                                  "validator point out the place.",
                                                  file, message.empty() ? "unknown reason" : oneLine(message)));
@@ -203,16 +235,17 @@ Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
 
 Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
     const std::string file = path.string();
-    const Expected<Bytes> bytes = readFile(path);
+    Expected<Bytes> bytes = readFile(path);
     if (!bytes) return std::unexpected(bytes.error());
     if (bytes->empty()) return fail(ErrorCode::BadInput, fmt::format("{}: is empty. Export the level again.", file));
 
     const bool glb = isGlb(*bytes);
-    std::string_view json(reinterpret_cast<const char*>(bytes->data()), bytes->size());
+    std::string json(bytes->begin(), bytes->end());
     if (glb) {
-        const Expected<std::string_view> chunk = glbJson(*bytes, file);
-        if (!chunk) return std::unexpected(chunk.error());
-        json = *chunk;
+        const Expected<GlbParts> parts = glbParts(*bytes, file);
+        if (!parts) return std::unexpected(parts.error());
+        json = parts->json;
+        if (!parts->only) *bytes = withoutOtherChunks(*bytes, *parts);
     }
     if (deepestNesting(json) > nesting_max)
         return fail(ErrorCode::BadInput, fmt::format("{}: its JSON nests more than {} levels deep. Remove such custom "
@@ -226,7 +259,7 @@ Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
             return fail(ErrorCode::BadInput,
                         fmt::format("{}: is glTF {}. Export it as glTF 2.0.", file, oneLine(model->asset.version)));
         if (!model) return std::unexpected(model.error());
-        return GltfSource{std::string(json), std::move(*model)};
+        return GltfSource{std::move(json), std::move(*model)};
     } catch (const std::bad_alloc&) {
         throw;                                 // importLevel says what that means
     } catch (const std::exception& problem) {  // the parser's JSON library throws on some malformed values

@@ -15,16 +15,6 @@ constexpr const char* extension_name = "EXT_lights_ies";
 
 using Bytes = std::vector<unsigned char>;
 
-// The parser decodes data of media types that it knows alone; any base64 will do here.
-bool decodeDataUri(const std::string& uri, Bytes& bytes) {
-    constexpr std::string_view marker = ";base64,";
-    const size_t at = uri.find(marker);
-    if (at == std::string::npos) return false;
-    std::string media_type;
-    const std::string known = "data:application/octet-stream;base64," + uri.substr(at + marker.size());
-    return tinygltf::DecodeDataURI(&bytes, media_type, known, 0, false);
-}
-
 // Where a node that carries the light puts its directions: -Z is the nadir. Scale changes nothing, a mirror does.
 glm::mat3 profileFromWorld(const glm::dmat4& world_from_node) {
     const glm::dvec3 z = glm::normalize(glm::dvec3(world_from_node[2]));

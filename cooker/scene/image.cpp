@@ -106,8 +106,12 @@ glm::vec4 Texture::mean() const {
 Expected<Texture> decodeImage(const ImportContext& context, int index, TransferFunction transfer,
                               const std::string& owner) {
     const tinygltf::Image& source = context.model.images[static_cast<size_t>(index)];
-    const std::string label = context.imageLabel(index) + (source.uri.empty() ? "" : " (" + source.uri + ")");
+    const bool is_data = source.uri.starts_with("data:");
+    const std::string label =
+        context.imageLabel(index) + (source.uri.empty() || is_data ? "" : " (" + source.uri + ")");
     const std::span<const unsigned char> bytes = encodedBytes(context.model, source);
+    if (bytes.empty() && is_data)
+        return context.error(owner, label + " is a data URI that is not base64. Export the level again.");
     if (bytes.empty())
         return context.error(owner,
                              label + " cannot be read. Put it beside the level, or export the level with its images.");

@@ -8,7 +8,9 @@
 #include <scene/light.h>
 #include <scene/material.h>
 #include <scene/mesh.h>
+#include <scene/misplaced_keys.h>
 #include <scene/node_walk.h>
+#include <scene/open_pose.h>
 #include <scene/sky.h>
 
 #include <algorithm>
@@ -22,7 +24,6 @@ namespace {
 
 constexpr std::string_view player_start = "player_start";
 constexpr double texel_density_max = 256;  // per metre, as in profiles
-const std::vector<std::string_view> bake_modes = {"indirect", "full", "none"};
 
 class LevelImporter {
    public:
@@ -89,9 +90,10 @@ class LevelImporter {
         if (*play_area)
             if (const auto ok = playArea(at); !ok) return ok;
 
-        const bool bakes_light = shines && of_light.has("dimmer_bake");
-        if (node.mesh >= 0 || shines)
-            if (const auto ok = warnOfMisplaced(extras, owner, node.mesh >= 0, bakes_light); !ok) return ok;
+        if (!carriesLight(at.node)) {
+            const NodeContent content{node.mesh >= 0, shines, shines && of_light.has("dimmer_bake")};
+            if (const auto ok = warnOfMisplacedKeys(context_, extras, owner, content); !ok) return ok;
+        }
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
         if (shines)
@@ -141,6 +143,13 @@ class LevelImporter {
                                   model_.nodes[static_cast<size_t>(parent)].name + "_Orientation";
     }
 
+    // Its keys are the light's.
+    bool carriesLight(int node) const {
+        return std::ranges::any_of(model_.nodes[static_cast<size_t>(node)].children, [&](int child) {
+            return isOrientationOf(child, node) && isLight(model_.nodes[static_cast<size_t>(child)]);
+        });
+    }
+
     // Without its materials', which do not speak for a light.
     Extras extrasOf(const PlacedNode& at, std::optional<int> light) const {
         const tinygltf::Node& node = model_.nodes[static_cast<size_t>(at.node)];
@@ -172,7 +181,10 @@ class LevelImporter {
         if (!own) return std::unexpected(own.error());
         DoorPart& part = door_of_node_[static_cast<size_t>(at.node)];
         if (at.parent >= 0) part = door_of_node_[static_cast<size_t>(at.parent)];
-        if (!*own) return {};
+        if (!*own) {
+            warnOfPoseWithoutDoor(context_, extras, owner);
+            return {};
+        }
         const auto pose = elements_.openPose(extras, owner, **own);
         if (!pose) return std::unexpected(pose.error());
         const glm::dmat4 moved = at.singular == -1 ? inWorld(*pose, at.world_from_node) : glm::dmat4(1);
@@ -259,20 +271,6 @@ class LevelImporter {
                                    [&](uint32_t material) { return isEmissive(scene_.materials[material]); });
     }
 
-    // What a key says of things that the node has not.
-    Expected<void> warnOfMisplaced(const Extras& extras, const std::string& owner, bool is_mesh, bool bakes_light) {
-        const auto bake = extras.choice("dimmer_bake", bake_modes);
-        if (!bake) return std::unexpected(bake.error());
-        if (*bake && !bakes_light)
-            context_.warn(owner, "'dimmer_bake' is for lights and was ignored; what shines is baked whole.");
-        if (extras.has("dimmer_max_weight") && !extras.has("dimmer_light_set"))
-            context_.warn(owner, "'dimmer_max_weight' without 'dimmer_light_set' was ignored.");
-        for (const char* key : {"dimmer_texel_density", "dimmer_grid_spacing"})
-            if (extras.raw(key) != nullptr && !is_mesh)
-                context_.warn(owner, fmt::format("'{}' is for meshes and was ignored.", key));
-        return {};
-    }
-
     // What joints or shape keys would move stands here as its vertices and its node say. What is dynamic may move.
     void warnOfDeformation(const tinygltf::Node& node, const std::string& owner) {
         if (node.skin >= 0)
@@ -356,7 +354,7 @@ class LevelImporter {
                                                 : importLight(context_, *punctual, at.node, at.world_from_node);
         if (!light) return std::unexpected(light.error());
         light->node = nodeName(at.node);
-        const auto bake = extras.choice("dimmer_bake", bake_modes);
+        const auto bake = extras.choice("dimmer_bake", {bake_modes.begin(), bake_modes.end()});
         if (!bake) return std::unexpected(bake.error());
         constexpr BakeMode of_choice[] = {BakeMode::Indirect, BakeMode::Full, BakeMode::None};
         if (*bake) light->bake = of_choice[**bake];
@@ -368,13 +366,9 @@ class LevelImporter {
     }
 
     Expected<void> withoutMeshOrLight(const PlacedNode& at, const Extras& extras, const std::string& owner) {
-        const auto& children = model_.nodes[static_cast<size_t>(at.node)].children;
-        const bool carries_light = std::ranges::any_of(children, [&](int child) {
-            return isOrientationOf(child, at.node) && isLight(model_.nodes[static_cast<size_t>(child)]);
-        });
         const auto set = extras.text("dimmer_light_set");
         if (!set) return std::unexpected(set.error());
-        if (*set && !carries_light) return withoutLight(owner, **set, extras.ownerOf("dimmer_light_set"));
+        if (*set && !carriesLight(at.node)) return withoutLight(owner, **set, extras.ownerOf("dimmer_light_set"));
         const auto dynamic = lighting(extras, owner);
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};
@@ -401,6 +395,7 @@ class LevelImporter {
 
     Expected<void> conclude() {
         if (const auto ok = elements_.checkDoors(); !ok) return ok;
+        if (const auto ok = checkOpenPoses(context_); !ok) return ok;
         Extras extras(context_);
         extras.add(sceneExtras(), "scene");
         if (const auto ok = elements_.combinations(extras); !ok) return ok;

@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <span>
 
 namespace dimmer::cook {
@@ -11,7 +13,8 @@ namespace {
 
 using nlohmann::json;
 
-enum class Kind { Index, Indices, Whole, Number, Numbers, Text, Flag, Object, IndexOfEach };
+// Whole: as many as memory can have; Small: what the parser keeps in 31 bits.
+enum class Kind { Index, Indices, Whole, Small, Number, Numbers, Text, Flag, Object, IndexOfEach };
 
 struct Rule {
     const char* key;
@@ -28,10 +31,13 @@ constexpr Rule of_node[] = {{"mesh", Kind::Index},
                             {"scale", Kind::Numbers, 3},
                             {"translation", Kind::Numbers, 3}};
 constexpr Rule of_primitive[] = {
-    {"attributes", Kind::IndexOfEach}, {"indices", Kind::Index}, {"material", Kind::Index}, {"mode", Kind::Whole}};
-constexpr Rule of_accessor[] = {{"bufferView", Kind::Index}, {"byteOffset", Kind::Whole},
-                                {"count", Kind::Whole},      {"type", Kind::Text},
-                                {"normalized", Kind::Flag},  {"componentType", Kind::Whole}};
+    {"attributes", Kind::IndexOfEach}, {"indices", Kind::Index}, {"material", Kind::Index}, {"mode", Kind::Small}};
+constexpr Rule of_accessor[] = {
+    {"bufferView", Kind::Index}, {"byteOffset", Kind::Whole},    {"count", Kind::Whole},  {"type", Kind::Text},
+    {"normalized", Kind::Flag},  {"componentType", Kind::Small}, {"sparse", Kind::Object}};
+constexpr Rule of_sparse[] = {{"count", Kind::Small}, {"indices", Kind::Object}, {"values", Kind::Object}};
+constexpr Rule of_sparse_part[] = {
+    {"bufferView", Kind::Index}, {"byteOffset", Kind::Small}, {"componentType", Kind::Small}};
 constexpr Rule of_view[] = {
     {"buffer", Kind::Index}, {"byteOffset", Kind::Whole}, {"byteLength", Kind::Whole}, {"byteStride", Kind::Whole}};
 constexpr Rule of_material[] = {{"pbrMetallicRoughness", Kind::Object}, {"emissiveFactor", Kind::Numbers, 3},
@@ -41,13 +47,26 @@ constexpr Rule of_surface[] = {{"baseColorFactor", Kind::Numbers, 4},
                                {"baseColorTexture", Kind::Object},
                                {"metallicFactor", Kind::Number},
                                {"roughnessFactor", Kind::Number}};
-constexpr Rule of_texture_info[] = {{"index", Kind::Index}, {"texCoord", Kind::Whole}};
+constexpr Rule of_texture_info[] = {{"index", Kind::Index}, {"texCoord", Kind::Small}, {"extensions", Kind::Object}};
+constexpr Rule of_texture_extensions[] = {{"KHR_texture_transform", Kind::Object}};
+constexpr Rule of_texture_transform[] = {
+    {"offset", Kind::Numbers, 2}, {"scale", Kind::Numbers, 2}, {"rotation", Kind::Number}, {"texCoord", Kind::Small}};
 constexpr Rule of_texture[] = {{"source", Kind::Index}, {"sampler", Kind::Index}};
 constexpr Rule of_image[] = {{"bufferView", Kind::Index}, {"uri", Kind::Text}, {"mimeType", Kind::Text}};
 
+// Whose values the parser hands over as ints. (It reads KHR_lights_punctual's lights themselves as numbers.)
+constexpr std::string_view read_extensions[] = {"EXT_lights_ies", "KHR_lights_punctual",
+                                                "KHR_materials_emissive_strength", "KHR_materials_specular",
+                                                "KHR_texture_transform"};
+
+bool fitsInt(const json& v) {
+    if (v.is_number_unsigned()) return v.get<uint64_t>() <= uint64_t{std::numeric_limits<int32_t>::max()};
+    return v.is_number_integer() && v.get<int64_t>() >= std::numeric_limits<int32_t>::min();
+}
+
 // -1 is what the parser has for none; other negative ones are told with what they refer to (gltf_check.h).
 bool isIndex(const json& v) {
-    return v.is_number_unsigned() || (v.is_number_integer() && v.get<int64_t>() != -1);
+    return fitsInt(v) && v.get<int64_t>() != -1;
 }
 
 bool isWhole(const json& v) {
@@ -63,13 +82,15 @@ std::string missing(const json& v, const Rule& rule) {
     const auto unless = [](bool obeys, std::string text) { return obeys ? std::string() : text; };
     switch (rule.kind) {
         case Kind::Index:
-            return unless(isIndex(v), "an index from 0");
+            return unless(isIndex(v), "an index from 0 to 2147483647");
         case Kind::Indices:
-            return unless(v.is_array() && all(v, isIndex), "a list of indices from 0");
+            return unless(v.is_array() && all(v, isIndex), "a list of indices from 0 to 2147483647");
         case Kind::IndexOfEach:
-            return unless(v.is_object() && all(v, isIndex), "an object of indices from 0");
+            return unless(v.is_object() && all(v, isIndex), "an object of indices from 0 to 2147483647");
         case Kind::Whole:
             return unless(isWhole(v), "a whole number from 0");
+        case Kind::Small:
+            return unless(fitsInt(v) && isWhole(v), "a whole number from 0 to 2147483647");
         case Kind::Number:
             return unless(v.is_number(), "a number");
         case Kind::Numbers: {
@@ -93,9 +114,17 @@ class TypeChecker {
     Expected<void> run() {
         static constexpr Rule of_root[] = {{"scene", Kind::Index}};
         object(root_, "the file", of_root);
+        if (const auto ies = memberOf(memberOf(&root_, "extensions"), "EXT_lights_ies"))
+            ints(*ies, "EXT_lights_ies", "the file");
+        if (const auto punctual = memberOf(memberOf(&root_, "extensions"), "KHR_lights_punctual"))
+            forEach(*punctual, "lights", "light", {});
         forEach("scenes", "scene", of_scene);
         forEach("nodes", "node", of_node);
-        forEach("accessors", "accessor", of_accessor);
+        forEach("accessors", "accessor", of_accessor, [&](const json& accessor, const std::string& owner) {
+            inner(accessor, "sparse", owner, of_sparse);
+            for (const char* part : {"indices", "values"})
+                if (const json* sparse = memberOf(&accessor, "sparse")) inner(*sparse, part, owner, of_sparse_part);
+        });
         forEach("bufferViews", "buffer view", of_view);
         forEach("textures", "texture", of_texture);
         forEach("images", "image", of_image);
@@ -109,15 +138,27 @@ class TypeChecker {
             if (surface == material.end()) return;
             object(*surface, owner, of_surface);
             inner(*surface, "baseColorTexture", owner, of_texture_info);
+            // The only one whose transform counts.
+            const json* extensions = memberOf(memberOf(&*surface, "baseColorTexture"), "extensions");
+            if (!extensions) return;
+            object(*extensions, owner, of_texture_extensions);
+            inner(*extensions, "KHR_texture_transform", owner, of_texture_transform);
+            intsBeside((*surface)["baseColorTexture"], owner);
         });
         if (problem_.empty()) return {};
         return fail(ErrorCode::BadInput, problem_);
     }
 
    private:
-    void forEach(const char* list, const char* what, std::span<const Rule> rules, auto&& more) {
-        const auto found = root_.find(list);
-        if (found == root_.end() || !found->is_array()) return;
+    // Null where there is none.
+    static const json* memberOf(const json* object, const char* key) {
+        if (!object || !object->is_object()) return nullptr;
+        const auto found = object->find(key);
+        return found == object->end() ? nullptr : &*found;
+    }
+    void forEach(const json& parent, const char* list, const char* what, std::span<const Rule> rules, auto&& more) {
+        const auto found = parent.find(list);
+        if (!parent.is_object() || found == parent.end() || !found->is_array()) return;
         for (size_t i = 0; i < found->size() && problem_.empty(); ++i) {
             const json& item = (*found)[i];
             const auto name = item.is_object() ? item.find("name") : item.end();
@@ -126,11 +167,35 @@ class TypeChecker {
             const std::string owner =
                 named ? fmt::format("{} '{}'", what, name->get<std::string>()) : fmt::format("{} {}", what, i);
             object(item, owner, rules);
+            intsBeside(item, owner);
             if (item.is_object()) more(item, owner);
         }
     }
-    void forEach(const char* list, const char* what, std::span<const Rule> rules) {
-        forEach(list, what, rules, [](const json&, const std::string&) {});
+    void forEach(const json& parent, const char* list, const char* what, std::span<const Rule> rules) {
+        forEach(parent, list, what, rules, [](const json&, const std::string&) {});
+    }
+    void forEach(const char* list, const char* what, std::span<const Rule> rules, auto&&... more) {
+        forEach(root_, list, what, rules, more...);
+    }
+    // Of extras and extensions what the cooker reads: the parser cuts whole numbers to 32 bits.
+    void intsBeside(const json& item, const std::string& owner) {
+        if (const json* extras = memberOf(&item, "extras"); extras && extras->is_object())
+            for (const auto& [key, value] : extras->items())
+                if (key.starts_with("dimmer_")) ints(value, key, owner);
+        if (const json* extensions = memberOf(&item, "extensions"); extensions && extensions->is_object())
+            for (const auto& [key, value] : extensions->items())
+                if (std::ranges::count(read_extensions, key) > 0) ints(value, key, owner);
+    }
+    void ints(const json& value, const std::string& key, const std::string& owner) {
+        if (value.is_object())
+            for (const auto& [inner_key, inner_value] : value.items()) ints(inner_value, inner_key, owner);
+        else if (value.is_array())
+            for (const json& item : value) ints(item, key, owner);
+        else if (value.is_number_integer() && !fitsInt(value) && problem_.empty())
+            problem_ = fmt::format(
+                "{}: {}: '{}' is {}, more than a whole number here can be. Write it with an exponent, "
+                "as 3e9.",
+                file_, owner, key, value.dump());
     }
     void inner(const json& parent, const char* key, const std::string& owner, std::span<const Rule> rules) {
         if (!parent.is_object()) return;

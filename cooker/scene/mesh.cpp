@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <scene/mesh.h>
-#include <scene/primitive.h>
 
 #include <algorithm>
 #include <limits>
@@ -127,6 +126,25 @@ class MeshBuilder {
 
 }  // namespace
 
+MeshImporter::MeshImporter(ImportContext& context, std::vector<TextureMapping> mappings)
+    : context_(context), mappings_(std::move(mappings)), users_(context.model.meshes.size()) {
+    for (const tinygltf::Node& node : context.model.nodes)
+        if (node.mesh >= 0) ++users_[static_cast<size_t>(node.mesh)];
+}
+
+Expected<std::shared_ptr<const PrimitiveGeometry>> MeshImporter::geometry(int mesh, size_t primitive,
+                                                                          const TextureMapping& mapping,
+                                                                          const std::string& owner) {
+    const auto known = known_.find({mesh, primitive});
+    if (known != known_.end()) return known->second;
+    auto read = readPrimitive(context_, context_.model.meshes[static_cast<size_t>(mesh)].primitives[primitive], mapping,
+                              owner, scratch_);
+    if (!read) return std::unexpected(read.error());
+    auto shared = std::make_shared<const PrimitiveGeometry>(std::move(*read));
+    if (users_[static_cast<size_t>(mesh)] > 1) known_[{mesh, primitive}] = shared;
+    return shared;
+}
+
 uint32_t MeshImporter::materialOf(const tinygltf::Primitive& primitive) {
     if (primitive.material >= 0) return static_cast<uint32_t>(primitive.material);
     if (!default_material_) {
@@ -146,20 +164,22 @@ Expected<SceneMesh> MeshImporter::import(int node, const std::vector<size_t>& pr
         const tinygltf::Primitive& primitive = mesh.primitives[index];
         const uint32_t material = materialOf(primitive);
         const TextureMapping mapping = primitive.material < 0 ? TextureMapping() : mappings_[material];
-        const auto geometry = readPrimitive(context_, primitive, mapping, owner);
-        if (!geometry) return std::unexpected(geometry.error());
-        triangles_total_ += geometry->triangles.size();
+        const auto found = geometry(mesh_index, index, mapping, owner);
+        if (!found) return std::unexpected(found.error());
+        const PrimitiveGeometry& read = **found;
+        for (const std::string& warning : read.warnings) context_.warn(owner, warning);
+        triangles_total_ += read.triangles.size();
         if (triangles_total_ > triangles_max)
             return context_.error(
                 owner, fmt::format("brings the level to more than {} triangles. Split the level.", triangles_max));
         if (primitive.material < 0)
             context_.warn(owner,
                           "has no material; glTF's default was used: white metal, reflectance 0.99. Give it one.");
-        if (context_.scene.materials[material].base_color_texture && geometry->uv0.empty())
+        if (context_.scene.materials[material].base_color_texture && read.uv0.empty() && !read.triangles.empty())
             context_.warn(owner,
                           fmt::format("has no TEXCOORD_{} for its material's texture; the texture's corner was used.",
                                       mapping.tex_coord));
-        if (const auto ok = builder.append(*geometry, material); !ok) return std::unexpected(ok.error());
+        if (const auto ok = builder.append(read, material); !ok) return std::unexpected(ok.error());
     }
     return builder.finish();
 }

@@ -3,6 +3,10 @@
 
 #include <scene/import_context.h>
 #include <scene/material.h>
+#include <scene/primitive.h>
+
+#include <map>
+#include <memory>
 
 namespace dimmer::cook {
 
@@ -14,8 +18,7 @@ inline constexpr double coordinate_max_m = 1e6;
 // scene when a primitive has none, and warnings where something was mended or dropped.
 class MeshImporter {
    public:
-    MeshImporter(ImportContext& context, std::vector<TextureMapping> mappings)
-        : context_(context), mappings_(std::move(mappings)) {}
+    MeshImporter(ImportContext& context, std::vector<TextureMapping> mappings);
 
     // `world_from_node` must not be singular.
     Expected<SceneMesh> import(int node, const std::vector<size_t>& primitives, const glm::dmat4& world_from_node);
@@ -24,8 +27,16 @@ class MeshImporter {
     uint32_t materialOf(const tinygltf::Primitive& primitive);
 
    private:
+    // Decoded once for all nodes that have the mesh.
+    Expected<std::shared_ptr<const PrimitiveGeometry>> geometry(int mesh, size_t primitive,
+                                                                const TextureMapping& mapping,
+                                                                const std::string& owner);
+
     ImportContext& context_;
-    std::vector<TextureMapping> mappings_;  // per material of the file
+    std::vector<TextureMapping> mappings_;                                              // per material of the file
+    std::vector<size_t> users_;                                                         // per mesh of the file: nodes
+    std::map<std::pair<int, size_t>, std::shared_ptr<const PrimitiveGeometry>> known_;  // by mesh and primitive
+    std::vector<uint32_t> scratch_;                                                     // readPrimitive's
     std::optional<uint32_t> default_material_;
     size_t triangles_total_ = 0;
 };

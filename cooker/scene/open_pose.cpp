@@ -1,6 +1,31 @@
+#include <fmt/format.h>
+#include <scene/mesh.h>
 #include <scene/open_pose.h>
 
+#include <algorithm>
+
 namespace dimmer::cook {
+namespace {
+
+bool opensByPose(const Scene& scene, const SceneMesh& mesh) {
+    return mesh.door && scene.doors[*mesh.door].pose && mesh.lighting != Lighting::Dynamic;
+}
+
+}  // namespace
+
+Expected<void> checkOpenPoses(const ImportContext& context) {
+    for (const SceneMesh& mesh : context.scene.meshes) {
+        const auto isNear = [&](const glm::vec3& p) {
+            return glm::length(glm::dvec3(mesh.open_from_closed * glm::dvec4(p, 1))) <= coordinate_max_m;
+        };
+        if (opensByPose(context.scene, mesh) && !std::ranges::all_of(mesh.positions_m, isNear))
+            return context.error(context.nodeLabel(mesh.gltf_node),
+                                 fmt::format("its open pose reaches more than {:.0f} km from the origin. Correct the "
+                                             "door's 'dimmer_door_translation' (metres).",
+                                             coordinate_max_m / 1000));
+    }
+    return {};
+}
 
 SceneMesh inOpenPose(SceneMesh closed) {
     const glm::dmat3 rotation(closed.open_from_closed);
@@ -14,7 +39,7 @@ void addOpenLeaves(Scene& scene) {
     const size_t count = scene.meshes.size();
     for (size_t m = 0; m < count; ++m) {
         const SceneMesh& mesh = scene.meshes[m];
-        if (!mesh.door || !scene.doors[*mesh.door].pose || mesh.lighting == Lighting::Dynamic) continue;
+        if (!opensByPose(scene, mesh)) continue;
         SceneMesh open = inOpenPose(mesh);
         scene.meshes.push_back(std::move(open));
     }

@@ -1,9 +1,12 @@
 // Where the leaves of doors stand when they are open.
 #pragma once
 
-#include <scene/scene.h>
+#include <scene/import_context.h>
 
 namespace dimmer::cook {
+
+// Errors name the node of a leaf that stands more than coordinate_max_m from the origin while its door is open.
+Expected<void> checkOpenPoses(const ImportContext& context);
 
 // A leaf as it stands while its door is open. `closed` must belong to a door that opens by a pose.
 SceneMesh inOpenPose(SceneMesh closed);

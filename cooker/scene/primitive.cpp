@@ -22,15 +22,22 @@ std::vector<glm::vec2> asVec2(const std::vector<float>& values) {
 
 class PrimitiveReader {
    public:
-    PrimitiveReader(ImportContext& context, const tinygltf::Primitive& primitive, const std::string& owner)
-        : context_(context), primitive_(primitive), owner_(owner) {}
+    PrimitiveReader(const ImportContext& context, const tinygltf::Primitive& primitive, const std::string& owner,
+                    std::vector<uint32_t>& number_of)
+        : context_(context), primitive_(primitive), owner_(owner), number_of_(number_of) {}
+    // For the next primitive, at the cost of this one.
+    ~PrimitiveReader() {
+        for (const uint32_t vertex : used_) number_of_[vertex] = UsedVertices::unused;
+    }
+    PrimitiveReader(const PrimitiveReader&) = delete;
+    PrimitiveReader& operator=(const PrimitiveReader&) = delete;
 
     Expected<PrimitiveGeometry> read(const TextureMapping& mapping) {
         if (primitive_.mode < TINYGLTF_MODE_TRIANGLES || primitive_.mode > TINYGLTF_MODE_TRIANGLE_FAN) {
-            context_.warn(owner_, "holds points or lines; they were skipped.");
+            geometry_.warnings.push_back("holds points or lines; they were skipped.");
             return geometry_;
         }
-        for (const auto step : {&PrimitiveReader::vertices, &PrimitiveReader::triangles})
+        for (const auto step : {&PrimitiveReader::triangles, &PrimitiveReader::vertices})
             if (const auto ok = (this->*step)(); !ok) return std::unexpected(ok.error());
         if (const auto ok = textureCoordinates(mapping); !ok) return std::unexpected(ok.error());
         return std::move(geometry_);
@@ -41,17 +48,11 @@ class PrimitiveReader {
     Expected<std::vector<float>> attribute(const std::string& name, Attribute kind) const {
         const auto found = primitive_.attributes.find(name);
         if (found == primitive_.attributes.end()) return std::vector<float>();
-        auto values = readAttribute(context_, found->second, kind, owner_);
-        const size_t components = kind == Attribute::TexCoord ? 2 : 3;
-        if (values && kind != Attribute::Position && values->size() / components != geometry_.positions.size())
-            return context_.error(owner_, fmt::format("{} has {} elements, POSITION {}. Export the level again.", name,
-                                                      values->size() / components, geometry_.positions.size()));
-        return values;
+        return readAttribute(context_, found->second, kind, {used_, std::span(number_of_).first(vertex_count_)},
+                             owner_);
     }
 
     Expected<void> vertices() {
-        if (!primitive_.attributes.contains("POSITION"))
-            return context_.error(owner_, "has a primitive without POSITION. Export the level again.");
         const auto positions = attribute("POSITION", Attribute::Position);
         if (!positions) return std::unexpected(positions.error());
         geometry_.positions = asVec3(*positions);
@@ -59,7 +60,8 @@ class PrimitiveReader {
         if (!normals) return std::unexpected(normals.error());
         geometry_.normals = asVec3(*normals);
         if (primitive_.attributes.contains("COLOR_0"))
-            context_.warn(owner_, "has vertex colours (COLOR_0), which are not baked: its materials' colours are.");
+            geometry_.warnings.push_back(
+                "has vertex colours (COLOR_0), which are not baked: its materials' colours are.");
         return {};
     }
 
@@ -79,21 +81,41 @@ class PrimitiveReader {
         return {};
     }
 
+    // As the file numbers the vertices, then as they are first used.
     Expected<void> triangles() {
-        std::vector<uint32_t> indices(geometry_.positions.size());
-        std::iota(indices.begin(), indices.end(), 0u);
+        const auto positions = primitive_.attributes.find("POSITION");
+        if (positions == primitive_.attributes.end())
+            return context_.error(owner_, "has a primitive without POSITION. Export the level again.");
+        const auto count = countElements(context_, positions->second, Attribute::Position, owner_);
+        if (!count) return std::unexpected(count.error());
+        vertex_count_ = *count;
+        std::vector<uint32_t> indices;
         if (primitive_.indices >= 0) {
             auto read = readIndices(context_, primitive_.indices, owner_);
             if (!read) return std::unexpected(read.error());
             indices = std::move(*read);
             const auto largest = std::ranges::max(indices);
-            if (largest >= geometry_.positions.size())
+            if (largest >= vertex_count_)
                 return context_.error(
                     owner_, fmt::format("has vertex index {}, but {} vertices. Export the level again.", largest,
-                                        geometry_.positions.size()));
+                                        vertex_count_));
+        } else {
+            indices.resize(vertex_count_);
+            std::iota(indices.begin(), indices.end(), 0u);
         }
         assemble(indices);
+        if (number_of_.size() < vertex_count_) number_of_.resize(vertex_count_, UsedVertices::unused);
+        for (glm::uvec3& triangle : geometry_.triangles)
+            for (int corner = 0; corner < 3; ++corner) triangle[corner] = numberOf(triangle[corner]);
         return {};
+    }
+
+    uint32_t numberOf(uint32_t vertex) {
+        if (number_of_[vertex] == UsedVertices::unused) {
+            number_of_[vertex] = static_cast<uint32_t>(used_.size());
+            used_.push_back(vertex);
+        }
+        return number_of_[vertex];
     }
 
     // glTF 2.0 specification, "Topology types".
@@ -102,7 +124,7 @@ class PrimitiveReader {
         const size_t n = v.size();
         if (primitive_.mode == TINYGLTF_MODE_TRIANGLES) {
             for (size_t i = 0; i + 2 < n; i += 3) triangles.emplace_back(v[i], v[i + 1], v[i + 2]);
-            if (n % 3 != 0) context_.warn(owner_, "its last triangle is incomplete and was dropped.");
+            if (n % 3 != 0) geometry_.warnings.push_back("its last triangle is incomplete and was dropped.");
         } else if (primitive_.mode == TINYGLTF_MODE_TRIANGLE_STRIP) {
             for (size_t i = 0; i + 2 < n; ++i) triangles.emplace_back(v[i], v[i + 1 + i % 2], v[i + 2 - i % 2]);
         } else {
@@ -110,17 +132,21 @@ class PrimitiveReader {
         }
     }
 
-    ImportContext& context_;
+    const ImportContext& context_;
     const tinygltf::Primitive& primitive_;
     const std::string& owner_;
+    size_t vertex_count_ = 0;  // of the file
+    std::vector<uint32_t> used_;
+    std::vector<uint32_t>& number_of_;  // see UsedVertices; may be longer than it takes
     PrimitiveGeometry geometry_;
 };
 
 }  // namespace
 
-Expected<PrimitiveGeometry> readPrimitive(ImportContext& context, const tinygltf::Primitive& primitive,
-                                          const TextureMapping& mapping, const std::string& owner) {
-    return PrimitiveReader(context, primitive, owner).read(mapping);
+Expected<PrimitiveGeometry> readPrimitive(const ImportContext& context, const tinygltf::Primitive& primitive,
+                                          const TextureMapping& mapping, const std::string& owner,
+                                          std::vector<uint32_t>& scratch) {
+    return PrimitiveReader(context, primitive, owner, scratch).read(mapping);
 }
 
 }  // namespace dimmer::cook

@@ -1,4 +1,5 @@
 #include <scene/uri.h>
+#include <tiny_gltf.h>
 
 #include <charconv>
 
@@ -17,6 +18,19 @@ std::string percentDecoded(const std::string& uri) {
         }
     }
     return path;
+}
+
+bool decodeDataUri(const std::string& uri, std::vector<unsigned char>& bytes) {
+    constexpr std::string_view marker = ";base64,";
+    const size_t at = uri.find(marker);
+    if (!uri.starts_with("data:") || at == std::string::npos) return false;
+    std::string media_type;
+    const std::string known = "data:application/octet-stream;base64," + uri.substr(at + marker.size());
+    return tinygltf::DecodeDataURI(&bytes, media_type, known, 0, false);
+}
+
+std::string pathIn(const std::string& folder, const std::string& name) {
+    return folder + (folder.ends_with('/') ? "" : "/") + name;
 }
 
 }  // namespace dimmer::cook

@@ -2,10 +2,18 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace dimmer::cook {
 
 // RFC 3986, 2.1. What is no escape stays as it is.
 std::string percentDecoded(const std::string& uri);
+
+// What a base64 data URI of whatever media type holds; false for others, and for none. The parser decodes those types
+// alone that it knows.
+bool decodeDataUri(const std::string& uri, std::vector<unsigned char>& bytes);
+
+// As the parser joins them: one '/' between, also below the root, whose name ends with it.
+std::string pathIn(const std::string& folder, const std::string& name);
 
 }  // namespace dimmer::cook

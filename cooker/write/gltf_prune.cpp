@@ -95,16 +95,50 @@ std::span<const std::byte> bytesOf(const tinygltf::Model& model, const Json& vie
         .subspan(view.value("byteOffset", size_t{0}), view.at("byteLength").get<size_t>());
 }
 
+// What an image's first bytes say that it is; else what the document says, if it does.
+std::string mediaType(std::string_view encoded, const Json& image) {
+    struct Format {
+        std::string_view media_type, begins;
+    };
+    static constexpr Format formats[] = {
+        {"image/png", "\x89PNG"},     {"image/jpeg", "\xFF\xD8\xFF"}, {"image/ktx2", "\xABKTX 20\xBB"},
+        {"image/vnd-ms.dds", "DDS "}, {"image/gif", "GIF8"},          {"image/bmp", "BM"}};
+    if (encoded.starts_with("RIFF") && encoded.substr(0, 12).ends_with("WEBP")) return "image/webp";
+    for (const Format& format : formats)
+        if (encoded.starts_with(format.begins)) return std::string(format.media_type);
+    return image.value("mimeType", "");
+}
+
+// Into the buffer, but what nobody can tell the type of: that stays where it is.
 void moveImagesIn(GlbDocument& document, const tinygltf::Model& model) {
     size_t i = 0;
     forItems(document.json, "images", [&](Json& image) {
         const auto& encoded = model.images.at(i++).image;
         if (image.contains("bufferView") || encoded.empty()) return;
+        const std::string type = mediaType({reinterpret_cast<const char*>(encoded.data()), encoded.size()}, image);
+        if (type.empty()) return;
         const size_t view = document.addView(std::as_bytes(std::span(encoded)));
         image.erase("uri");
         image["bufferView"] = view;
-        image["mimeType"] = encoded[0] == 0x89 ? "image/png" : "image/jpeg";
+        image["mimeType"] = type;
     });
+}
+
+void eraseExtension(Json& object, const char* name) {
+    const auto extensions = object.find("extensions");
+    if (extensions == object.end()) return;
+    extensions->erase(name);
+    if (extensions->empty()) object.erase("extensions");
+}
+
+// Another way to data that the document has in the usual way too, and is written in that one.
+void dropCompression(Json& d) {
+    constexpr const char* name = "EXT_meshopt_compression";
+    for (const char* list : {"bufferViews", "buffers"})
+        forItems(d, list, [&](Json& item) { eraseExtension(item, name); });
+    for (const char* list : {"extensionsUsed", "extensionsRequired"})
+        if (const auto found = d.find(list); found != d.end())
+            found->erase(std::remove(found->begin(), found->end(), Json(name)), found->end());
 }
 
 }  // namespace
@@ -112,6 +146,7 @@ void moveImagesIn(GlbDocument& document, const tinygltf::Model& model) {
 void adoptUsed(GlbDocument& document, Json original, const tinygltf::Model& model) {
     document.json = std::move(original);
     Json& d = document.json;
+    dropCompression(d);
     if (onlyKnownReferences(d)) {
         prune(d, "meshes", forMeshReferences);
         prune(d, "accessors", forAccessorReferences);

@@ -323,6 +323,16 @@ bool giveRights(int file, const std::optional<struct stat>& replaced) {
 // What mkstemp makes random behind the name of a file that is replaced.
 constexpr std::string_view temporary_suffix = ".XXXXXX";
 
+// The name is the folder's: without it a power cut may leave the old file. What cannot be opened or flushed is as it
+// is.
+void flushFolder(const std::filesystem::path& file) {
+    const auto folder = file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
+    const int opened = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (opened < 0) return;
+    fsync(opened);
+    close(opened);
+}
+
 Expected<void> replaceFile(const std::filesystem::path& path, std::span<const std::byte> bytes, Flush flush) {
     const std::scoped_lock lock(fileReplacement());
     std::string temporary = path.string().append(temporary_suffix);
@@ -332,7 +342,10 @@ Expected<void> replaceFile(const std::filesystem::path& path, std::span<const st
         writeAll(file, bytes) && giveRights(file, fileAt(path)) && (flush == Flush::No || fsync(file) == 0);
     const int error = written ? 0 : errno;
     close(file);
-    if (written && rename(temporary.c_str(), path.c_str()) == 0) return {};
+    if (written && rename(temporary.c_str(), path.c_str()) == 0) {
+        if (flush == Flush::Yes) flushFolder(path);
+        return {};
+    }
     const auto failed = ioError(path, "cannot be written, nothing was changed", written ? errno : error);
     unlink(temporary.c_str());
     return failed;

@@ -1,5 +1,7 @@
 // The contract with scripts: exit codes, what goes to stdout and what to stderr, names of JSON keys, help.
 #include <app/tool_fixture.h>
+#include <dimmer/version.h>
+#include <fmt/format.h>
 #include <pack/sample_pack.h>
 #include <write/pack_writer.h>
 
@@ -48,6 +50,20 @@ TEST_F(Commands, HelpExplainsEachCommandWithUnitsAndAnExample) {
     const auto sample = runProcess(DIMMER_SAMPLE_TOOL, {"--help"});
     EXPECT_EQ(sample.exit_code, 0);
     EXPECT_THAT(sample.out, AllOf(HasSubstr("Example: dimmer-sample "), HasSubstr("pixels")));
+}
+
+// Headers, tools and CMake's project say the same.
+TEST_F(Commands, SayTheirVersion) {
+    const std::string version = DIMMER_PROJECT_VERSION;
+    EXPECT_EQ(DIMMER_VERSION, version);
+    EXPECT_EQ(fmt::format("{}.{}.{}", DIMMER_VERSION_MAJOR, DIMMER_VERSION_MINOR, DIMMER_VERSION_PATCH), version);
+    const auto tool = runDimmer({"--version"});
+    EXPECT_EQ(tool.exit_code, 0) << tool.err;
+    EXPECT_EQ(tool.out, "dimmer " + version + "\n");
+    EXPECT_THAT(tool.err, IsEmpty());
+    const auto sample = runProcess(DIMMER_SAMPLE_TOOL, {"--version"});
+    EXPECT_EQ(sample.exit_code, 0) << sample.err;
+    EXPECT_EQ(sample.out, "dimmer-sample " + version + "\n");
 }
 
 TEST_F(Commands, WrongUsage) {
@@ -154,7 +170,8 @@ TEST_F(Commands, InspectJson) {
     ASSERT_EQ(result.exit_code, 0) << result.err;
     const json j = json::parse(result.out);
     expectKeys(j, {"format_version", "exposure", "bytes", "receivers", "pages", "contributions", "elements", "clusters",
-                   "batches", "mixed_batches", "overlap_histogram", "settings"});
+                   "batches", "overlap_histogram", "settings"});
+    EXPECT_FALSE(j.contains("mixed_batches"));
     expectKeys(j["bytes"],
                {"file", "device", "base_lightmap", "dynamic", "local_grids", "global_grid", "ancillary", "meshes"});
     expectKeys(j["receivers"], {"texels", "local_probes", "global_probes"});

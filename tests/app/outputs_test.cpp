@@ -197,6 +197,22 @@ TEST_F(Outputs, ACacheThatCannotBeIsDoneWithout) {
     EXPECT_THAT(result.err, HasSubstr("cooked without a cache"));
 }
 
+// What would be ignored is refused.
+TEST_F(Outputs, ACacheThatNothingWouldUse) {
+    const auto expectRefused = [](const std::vector<std::string>& more) {
+        const auto result = cook("never.dimmer", more);
+        EXPECT_EQ(result.exit_code, 2) << result.err;
+        EXPECT_THAT(result.err, AllOf(HasSubstr(more[0]), HasSubstr("excludes")));
+        EXPECT_FALSE(std::filesystem::exists(file("never.dimmer")));
+    };
+    expectRefused({"--cache", file("some"), "--per-set-passes"});
+    expectRefused({"--cache", file("some"), "--grid-baseline", "uniform"});
+    expectRefused({"--cache-limit", "10", "--no-cache"});
+    expectRefused({"--cache-limit", "10", "--per-set-passes"});
+    const auto result = cook("passes.dimmer", {"--per-set-passes", "--no-cache"});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+}
+
 TEST_F(Outputs, WhatIsReadOnlyStays) {
     const std::string kept = write("kept.dimmer", "kept");
     std::filesystem::permissions(kept, std::filesystem::perms(0444));

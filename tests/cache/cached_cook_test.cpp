@@ -47,11 +47,13 @@ struct CachedCook : testing::Test {
     const TemporaryFolder folder;
     std::string profile = writeText(folder, "quick.json", quick_profile).string();
 
-    CookResult run(const LevelFile& level, bool with_cache, const std::string& pack = "level.dimmer") {
+    CookResult run(const LevelFile& level, bool with_cache, const std::string& pack = "level.dimmer",
+                   uint64_t cache_bytes_max = uint64_t{4} << 30) {
         SilentProgress silent;
         CookOptions options{
             .level = writeLevel(folder, level), .pack = folder.path / pack, .profile = profile, .quality = "draft"};
         if (with_cache) options.cache = folder.path / "cache";
+        options.cache_bytes_max = cache_bytes_max;
         auto result = cook(options, silent);
         EXPECT_TRUE(result.has_value()) << result.error().message;
         return result ? std::move(*result) : CookResult{};
@@ -165,6 +167,74 @@ TEST_F(CachedCook, ARenamedLampMakesThePackAlone) {
     EXPECT_THAT(made(level), ElementsAre("pack"));
 }
 
+// Numbers and names of the file are no part of what is baked.
+TEST_F(CachedCook, ACameraFirstOrNewNamesMakeThePackAlone) {
+    LevelFile level = houseOfTwo();
+    level.document["nodes"].back().erase("name");  // the shelf's: it is called by its number
+    made(level);
+    level.document["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}}};
+    json& nodes = level.document["nodes"];
+    nodes.insert(nodes.begin(), json{{"name", "camera"}, {"camera", 0}});
+    json& roots = level.document["scenes"][0]["nodes"];
+    for (json& root : roots) root = root.get<int>() + 1;
+    roots.insert(roots.begin(), 0);
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    for (json& node : nodes)
+        if (node.value("name", "") == "cell1") node["name"] = "kitchen";
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    EXPECT_TRUE(std::ranges::any_of(run(level, true).pack.meshes, [](const Mesh& m) { return m.node == "kitchen"; }));
+    level.document["materials"][0]["name"] = "plaster";
+    EXPECT_THAT(made(level), IsEmpty());
+    // Meshes in another order, which nodes name by their numbers.
+    json& meshes = level.document["meshes"];
+    std::swap(meshes[0], meshes[1]);
+    for (json& node : nodes)
+        if (node.contains("mesh") && node["mesh"] < 2) node["mesh"] = 1 - node["mesh"].get<int>();
+    EXPECT_THAT(made(level), IsEmpty());
+}
+
+// Warnings of charts name nodes as they are called now.
+TEST_F(CachedCook, WarningsOfChartsThatAreAllThereNameTheNode) {
+    LevelFile level = houseOfTwo();
+    level.document["nodes"][0]["extras"]["dimmer_texel_density"] = 40;  // 2 m: longer than a page
+    profile =
+        writeText(folder, "pages.json", std::string(quick_profile).insert(1, R"("lightmaps": {"page_size": 64}, )"))
+            .string();
+    const auto warned = [&] {
+        std::string of;
+        for (const std::string& w : run(level, true).stats.warnings)
+            if (w.find("one of its surfaces is") != std::string::npos) of += w.substr(w.find("node '")) + "\n";
+        return of;
+    };
+    EXPECT_THAT(warned(), testing::StartsWith("node 'cell1': one of its surfaces is 80 texels long"));
+    level.document["nodes"][0]["name"] = "kitchen";
+    EXPECT_THAT(warned(), testing::StartsWith("node 'kitchen': one of its surfaces is 80 texels long"));
+    EXPECT_THAT(made(level), IsEmpty());
+}
+
+// Too little for a level: every cook would make all of it again, and nobody would know why.
+TEST_F(CachedCook, ALimitThatTheLevelDoesNotFitIsWarnedOf) {
+    const LevelFile level = houseOfTwo();
+    EXPECT_THAT(run(level, true).stats.warnings, testing::Not(testing::Contains(HasSubstr("--cache-limit"))));
+    EXPECT_THAT(run(level, true, "level.dimmer", 2000).stats.warnings,
+                testing::Contains(testing::AllOf(HasSubstr("2.0 kB"), HasSubstr("--cache-limit"))));
+    // What others left goes first, and is no matter.
+    std::filesystem::remove_all(folder.path / "cache");
+    run(level, true);
+    uint64_t bytes = 0;
+    const uint64_t pack = std::filesystem::file_size(folder.path / "level.dimmer");
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(1);
+    for (const auto& file : std::filesystem::directory_iterator(folder.path / "cache")) {
+        bytes += file.file_size();
+        std::filesystem::last_write_time(file, before);
+    }
+    LevelFile brighter = level;
+    lamp(brighter, 2)["intensity"] = 137.31;
+    // The pack before goes; all that both cooks use stays.
+    EXPECT_THAT(run(brighter, true, "level.dimmer", bytes + pack / 2).stats.warnings,
+                testing::Not(testing::Contains(HasSubstr("--cache-limit"))));
+}
+
 // The same with a thing that moves, and so with a global grid.
 LevelFile houseWithGrid() {
     LevelFile level = houseOfTwo();
@@ -234,6 +304,22 @@ TEST_F(CachedCook, RaysOfEarlierCooksAreNotTracedAgain) {
     const uint64_t unknown = raysWithLampAt(8.6);
     EXPECT_GT(known, 0u);
     EXPECT_LT(3 * known, unknown);  // shadow rays, rays aimed at doors, and places around the lamp are new
+}
+
+// Lamps of two sets change places in the file: each set's are in the same order as before, all together are not, and
+// the grid looks around them one after the other.
+TEST_F(CachedCook, LampsThatTakeTurnsOtherwiseMakeTheGridAlone) {
+    LevelFile level = houseWithGrid();
+    for (const auto& [name, x] : {std::pair{"one", 1.4}, {"two", 9.4}}) {
+        const int index = level.addLight(std::string("second_") + name, {{"type", "point"}, {"intensity", 30}},
+                                         {{"dimmer_light_set", name}, {"dimmer_bake", "full"}});
+        level.node(index)["translation"] = {x, 1.6, 0.4};
+    }
+    made(level);
+    json& roots = level.document["scenes"][0]["nodes"];
+    std::swap(roots[roots.size() - 1], roots[roots.size() - 2]);
+    EXPECT_THAT(made(level), ElementsAre("pack", "global grid"));
+    EXPECT_THAT(made(level), IsEmpty());
 }
 
 TEST_F(CachedCook, APlayAreaMakesTheGridAlone) {

@@ -115,10 +115,36 @@ TEST(Dissect, WhatCannotBeToldApartIsRefusedAtOnce) {
     denser["lightmaps.texels_per_metre"]["value"] = 16;
     for (const VerifyOptions& options : {causes, formats}) {
         expectRefused("{}", options, "no quality");  // no level was cooked into it
-        expectRefused(denser.dump(), options, "pages are not those of this level");
+        expectRefused(denser.dump(), options, "charts are not those of the pack");
     }
     causes.state = "door:front=1";
     expectRefused(data->settings_json, causes, "closed doors");
+}
+
+// As many pages of the same size, and yet other charts: causes would be told of the wrong texels.
+TEST(Dissect, AnEditedLevelIsRefused) {
+    LevelFile level = twoCells();
+    const auto before = level.import();
+    ASSERT_TRUE(before) << before.error().message;
+    SilentProgress silent;
+    CookStats stats;
+    auto data = cookScene(*before, smallProfile(), "draft", silent, stats);
+    ASSERT_TRUE(data) << data.error().message;
+    const auto pack = Pack::fromData(std::move(*data));
+    level.node(1)["translation"] = {0, 0, 0.5};
+    const auto after = level.import();
+    ASSERT_TRUE(after) << after.error().message;
+    for (const bool formats : {false, true}) {
+        CountedStages progress;
+        const auto report =
+            verify(*after, *pack,
+                   {.state = "", .points = 10, .paths_max = 64, .sets = false, .causes = !formats, .formats = formats},
+                   progress);
+        ASSERT_FALSE(report);
+        EXPECT_NE(report.error().message.find("charts are not those of the pack"), std::string::npos)
+            << report.error().message;
+        EXPECT_EQ(progress.count, 0);
+    }
 }
 
 }  // namespace

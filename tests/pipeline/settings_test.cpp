@@ -7,6 +7,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <map>
 
 namespace dimmer::cook::test {
 namespace {
@@ -52,6 +53,27 @@ TEST(Settings, TheSchemaHoldsEverySettingOnce) {
             EXPECT_EQ(schema[place]["maximum"], s.most) << s.key;
         }
     }
+}
+
+// What a profile gets that says nothing: desktop.json's, and of what that does not state the values here.
+TEST(Settings, TheSchemaHoldsEveryDefault) {
+    const json schema = json::parse(readText(schema_file));
+    const json desktop = json::parse(readText(schema_file.parent_path() / "desktop.json")).flatten();
+    std::map<std::string, json> defaults = {
+        {"/budgets/base_lightmaps", 0}, {"/budgets/global_grid", 0},     {"/budgets/local_grids", 0},
+        {"/budgets/per_element", 0},    {"/records/door_share", 0.2},    {"/records/overlap_max", 0},
+        {"/grids/global", "auto"},      {"/grids/local_probes_max", 64},
+    };
+    for (const auto& [place, value] : desktop.items())
+        if (place != "/$schema" && place != "/description") defaults[place] = value;
+    for (const auto& [place, value] : defaults) {
+        std::string in_schema = place;
+        for (size_t at = 0; (at = in_schema.find('/', at)) != std::string::npos; at += sizeof("/properties/") - 1)
+            in_schema.replace(at, 1, "/properties/");
+        EXPECT_EQ(schema.value(json::json_pointer(in_schema + "/default"), json()), value) << place;
+    }
+    Profile profile;
+    EXPECT_EQ(defaults.size(), settingsOf(profile).size());
 }
 
 TEST(Settings, ShippedProfilesNameTheSchemaAndKeepToIt) {

@@ -5,6 +5,7 @@
 #include <pipeline/cooked_level.h>
 #include <pipeline/small_level.h>
 #include <pipeline/write_level.h>
+#include <report/page_pictures.h>
 #include <write/glb_document.h>
 #include <write/pack_writer.h>
 
@@ -384,6 +385,66 @@ TEST(WriteLevel, ALevelThatWasChangedSinceIsRefused) {
     ASSERT_FALSE(result);
     EXPECT_EQ(result.error().code, ErrorCode::BadInput);
     EXPECT_THAT(result.error().message, HasSubstr("changed since"));
+}
+
+std::string base64Of(const std::string& bytes) {
+    return base64(std::as_bytes(std::span(bytes)));
+}
+
+// Textures may name images that only other programs read; they are no JPEG for that.
+TEST(WriteLevel, ImagesAreCalledWhatTheyAre) {
+    struct Picture {
+        std::string begins, type, written;
+    };
+    const Picture pictures[] = {
+        {std::string("RIFF\x08\0\0\0WEBPVP8 ", 16), "image/webp", "image/webp"},
+        {"\xABKTX 20\xBB\r\n\x1A\n", "image/ktx2", "image/ktx2"},
+        {"DDS |", "image/vnd-ms.dds", "image/vnd-ms.dds"},
+        {"\x89PNG\r\n\x1A\n", "image/png", "image/png"},
+        {"\xFF\xD8\xFF\xE0", "image/jpg", "image/jpeg"},
+        {"what?", "image/never", ""},  // stays as it was
+    };
+    LevelFile level = LevelFile::withFloor();
+    level.addLight("sun", {{"type", "directional"}, {"intensity", 10}});
+    for (const Picture& p : pictures)
+        level.document["images"].push_back({{"uri", "data:" + p.type + ";base64," + base64Of(p.begins + "....")}});
+    const Written written(level);
+    const Glb glb(written.path);
+    const json& images = glb.document["images"];
+    ASSERT_EQ(images.size(), std::size(pictures));
+    for (size_t i = 0; i < images.size(); ++i) {
+        EXPECT_EQ(images[i].value("mimeType", ""), pictures[i].written);
+        EXPECT_EQ(images[i].contains("uri"), pictures[i].written.empty());
+        EXPECT_EQ(images[i].contains("bufferView"), !pictures[i].written.empty());
+    }
+}
+
+// Where views are compressed besides, the plain bytes are written, and nothing tells of the others.
+TEST(WriteLevel, CompressionThatIsNotNeededGoes) {
+    LevelFile level = LevelFile::withFloor();
+    level.addLight("sun", {{"type", "directional"}, {"intensity", 10}});
+    level.document["extensionsUsed"] = {"EXT_meshopt_compression", "KHR_lights_punctual"};
+    for (json& view : level.document["bufferViews"])
+        view["extensions"] = {{"EXT_meshopt_compression",
+                               {{"buffer", 1},
+                                {"byteOffset", 4},
+                                {"byteLength", 8},
+                                {"byteStride", 12},
+                                {"count", 4},
+                                {"mode", "ATTRIBUTES"}}},
+                              {"ACME_note", {{"kept", true}}}};
+    json buffers = json::parse(level.gltfText())["buffers"];
+    buffers[0]["extensions"] = {{"EXT_meshopt_compression", {{"fallback", true}}}};
+    buffers.push_back(
+        {{"byteLength", 16}, {"uri", "data:application/octet-stream;base64," + base64Of(std::string(16, 'x'))}});
+    level.document["buffers"] = buffers;
+    const Written written(level);
+    const Glb glb(written.path);
+    EXPECT_EQ(glb.document.dump().find("meshopt"), std::string::npos);
+    EXPECT_EQ(glb.document["extensionsUsed"], json({"KHR_lights_punctual"}));
+    const auto again = importLevel(written.path);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->meshes.at(0).triangles.size(), 2u);
 }
 
 TEST(WriteLevel, ImagesAndTransformsOfTexturesGoAlong) {

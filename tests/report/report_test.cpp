@@ -88,6 +88,9 @@ TEST(Report, HoldsEverythingAndFetchesNothing) {
                             HasSubstr("1.23 MB"), HasSubstr("12.50 s"), HasSubstr("bake: bounces"), HasSubstr("2.25 s"),
                             HasSubstr("13.00 s in all"), HasSubstr("node &#39;lamp&#39;: it is inside a wall"),
                             HasSubstr("dynamic records")));
+    // Bytes read as everywhere else.
+    input.file_bytes = 999;
+    EXPECT_THAT(htmlOf(pack, input), AllOf(HasSubstr("999 B"), Not(HasSubstr("1.0 kB"))));
     for (const Element& e : pack.elements())
         EXPECT_THAT(html, HasSubstr("region of " + std::string(e.kind == ElementKind::Door ? "door:" : "") + e.name));
     EXPECT_THAT(html, AllOf(Not(HasSubstr("http:")), Not(HasSubstr("https:")), Not(HasSubstr("src=\"//")),

@@ -64,6 +64,30 @@ TEST(SceneBadInput, IndicesOutOfRangeNameTheirOwner) {
     const Fault faults[] = {
         {"node's mesh", [](json& d) { d["nodes"][1]["mesh"] = 99; }, {"node 'panel'", "mesh 99"}},
         {"negative mesh", [](json& d) { d["nodes"][1]["mesh"] = -7; }, {"node 'panel'", "mesh -7"}},
+        {"mesh of 2^32 - 1", [](json& d) { d["nodes"][1]["mesh"] = 4294967295u; }, {"node 'panel'", "4294967295"}},
+        {"mesh of 2^32", [](json& d) { d["nodes"][1]["mesh"] = 4294967296u; }, {"node 'panel'", "4294967296"}},
+        {"mesh of -2^32", [](json& d) { d["nodes"][1]["mesh"] = -4294967296; }, {"node 'panel'", "-4294967296"}},
+        {"material of 2^32 - 1",
+         [](json& d) { d["meshes"][0]["primitives"][0]["material"] = 4294967295u; },
+         {"mesh 0", "'material'", "4294967295"}},
+        {"material of 2^32",
+         [](json& d) { d["meshes"][0]["primitives"][0]["material"] = 4294967296u; },
+         {"mesh 0", "'material'", "4294967296"}},
+        {"indices of 2^32 - 1",
+         [](json& d) { d["meshes"][0]["primitives"][0]["indices"] = 4294967295u; },
+         {"mesh 0", "'indices'", "4294967295"}},
+        {"indices of 2^32",
+         [](json& d) { d["meshes"][0]["primitives"][0]["indices"] = 4294967296u; },
+         {"mesh 0", "'indices'", "4294967296"}},
+        {"mode of 2^32",
+         [](json& d) { d["meshes"][0]["primitives"][0]["mode"] = 4294967300u; },
+         {"mesh 0", "'mode'", "4294967300"}},
+        {"sparse count of 2^32",
+         [](json& d) { d["accessors"][0]["sparse"]["count"] = 4294967297u; },
+         {"accessor 0", "'count'", "4294967297"}},
+        {"sparse view of 2^32",
+         [](json& d) { d["accessors"][0]["sparse"]["values"]["bufferView"] = 4294967296u; },
+         {"accessor 0", "'bufferView'", "4294967296"}},
         {"node's light",
          [](json& d) { d["nodes"][3]["extensions"]["KHR_lights_punctual"]["light"] = 4; },
          {"node 'lamp'", "light 4"}},
@@ -161,6 +185,44 @@ TEST(SceneBadInput, ValuesOfTheWrongTypeNameTheirPlace) {
     }
 }
 
+// The parser cuts whole numbers of extras and extensions to 32 bits: 2^32 + 2 candela would be 2.
+TEST(SceneBadInput, WholeNumbersThatDoNotFitAreRefused) {
+    const Fault faults[] = {
+        {"extras",
+         [](json& d) { d["nodes"][0]["extras"]["dimmer_texel_density"] = 4294967298u; },
+         {"node 'floor'", "'dimmer_texel_density'", "4294967298", "3e9"}},
+        {"list",
+         [](json& d) {
+             d["nodes"][2]["extras"]["dimmer_door_translation"] = {0, -2147483649, 0};
+         },
+         {"node 'door'", "'dimmer_door_translation'", "-2147483649"}},
+        {"scene",
+         [](json& d) { d["scenes"][0]["extras"]["dimmer_sky_luminance"] = 4294967298u; },
+         {"scene 0", "'dimmer_sky_luminance'", "4294967298"}},
+        {"material",
+         [](json& d) {
+             d["materials"][1]["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = 4294967298u;
+         },
+         {"material 'glow'", "'emissiveStrength'", "4294967298"}},
+        {"node's light",
+         [](json& d) { d["nodes"][3]["extensions"]["KHR_lights_punctual"]["light"] = 4294967296u; },
+         {"node 'lamp'", "'light'", "4294967296"}},
+    };
+    for (const Fault& fault : faults) {
+        LevelFile level = fullLevel();
+        fault.apply(level.document);
+        SCOPED_TRACE(fault.name);
+        expectBadInput(level.import(), fault.message);
+    }
+    // Numbers of others, and those that are no whole ones, are what they are.
+    LevelFile level = fullLevel();
+    level.node(0)["extras"] = {{"made_at_ms", 1700000000000}};
+    level.document["materials"][1]["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = 4294967298.0;
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_FLOAT_EQ(scene->materials[1].emission_cd_m2.x, 4294967298.0f);
+}
+
 TEST(SceneBadInput, AccessorsBeyondTheirBytes) {
     static constexpr uint64_t huge = std::numeric_limits<uint64_t>::max();
     const Fault faults[] = {
@@ -236,6 +298,15 @@ TEST(SceneBadInput, NumbersThatAreNotFinite) {
         normals.addNode({{"name", "wall"}, {"mesh", mesh}});
         expectBadInput(normals.import(), {"node 'wall'", "NORMAL", "vertex 2"});
     }
+    // An open pose stands in the level, too.
+    LevelFile door = LevelFile::withFloor();
+    const json pose = {
+        {"dimmer_door", "front"}, {"dimmer_door_open", "pose"}, {"dimmer_door_translation", {1e9, 0, 0}}};
+    const int leaf = door.addNode({{"name", "leaf"}, {"mesh", door.addSquareMesh(0)}, {"extras", pose}});
+    expectBadInput(door.import(), {"node 'leaf'", "open pose", "km"});
+    door.node(leaf)["extras"]["dimmer_door_open"] = "remove";  // it never gets there
+    ASSERT_IMPORTED(door.import());
+
     LevelFile far_away = LevelFile::withFloor();
     far_away.node(0)["scale"] = {1e7, 1, 1};
     expectBadInput(far_away.import(), {"node 'floor'", "km"});
@@ -308,6 +379,51 @@ TEST(SceneBadInput, EveryTruncationIsRefused) {
     for (size_t length = 0; length < whole.size(); length += 5)
         expectBadInput(importBytes("level.glb", {whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(length)}),
                        {});
+}
+
+void appendWord(std::vector<uint8_t>& bytes, size_t value) {
+    for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<uint8_t>(value >> shift));
+}
+
+// `glb` with its chunks from the second on replaced by these: type and content.
+std::vector<uint8_t> withChunks(const std::vector<uint8_t>& glb,
+                                const std::vector<std::pair<uint32_t, std::vector<uint8_t>>>& chunks) {
+    const size_t json_end = 20 + (glb[12] | size_t{glb[13]} << 8 | size_t{glb[14]} << 16);
+    std::vector<uint8_t> bytes(glb.begin(), glb.begin() + static_cast<std::ptrdiff_t>(json_end));
+    for (const auto& [type, content] : chunks) {
+        appendWord(bytes, content.size());
+        appendWord(bytes, type);
+        bytes.insert(bytes.end(), content.begin(), content.end());
+    }
+    for (size_t i = 0; i < 4; ++i) bytes[8 + i] = static_cast<uint8_t>(bytes.size() >> 8 * i);
+    return bytes;
+}
+
+// glTF 2.0, "GLB File Format": readers pass over chunks that they do not know; the binary one may be empty.
+TEST(SceneBadInput, ChunksOfAGlbThatSayNothingArePassedOver) {
+    constexpr uint32_t binary = 0x004E4942, unknown = 0x50415453;
+    LevelFile level = LevelFile::withFloor();
+    std::vector<uint8_t> buffer = level.buffer;
+    while (buffer.size() % 4 != 0) buffer.push_back(0);
+    const std::vector<uint8_t> other = {1, 2, 3, 4};
+    const std::vector<std::vector<std::pair<uint32_t, std::vector<uint8_t>>>> inside = {
+        {{binary, buffer}, {unknown, other}},
+        {{unknown, other}, {binary, buffer}},
+        {{binary, buffer}, {binary, other}},  // the first is the buffer's
+    };
+    for (const auto& chunks : inside) {
+        const auto scene = importBytes("level.glb", withChunks(level.glb(), chunks));
+        ASSERT_IMPORTED(scene);
+        expectNear(scene->meshes[0].positions_m[2], {1, 0, 1});
+    }
+    const std::string text = level.gltfText();
+    level.document["buffers"] = json::parse(text)["buffers"];  // a data URI
+    for (const auto& chunks : std::vector<std::vector<std::pair<uint32_t, std::vector<uint8_t>>>>{
+             {}, {{binary, {}}}, {{unknown, other}}, {{binary, {}}, {unknown, {}}}}) {
+        const auto scene = importBytes("level.glb", withChunks(level.glb(), chunks));
+        ASSERT_IMPORTED(scene);
+        expectNear(scene->meshes[0].positions_m[2], {1, 0, 1});
+    }
 }
 
 // Found by fuzzing: where the header counts nothing, no chunk was checked, and the JSON's length was believed.

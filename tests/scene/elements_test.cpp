@@ -70,6 +70,42 @@ TEST(SceneElements, KeysOfOtherThingsAreWarnedOf) {
     expectBadInput(level.import(), {"node 'floor'", "dimmer_bake", "'ful'"});
 }
 
+// Of an empty and a camera as of a lamp; nothing is handed down to what is below.
+TEST(SceneElements, KeysOfMeshesAndLightsOnOtherNodesAreWarnedOf) {
+    for (const bool camera : {false, true}) {
+        LevelFile level = LevelFile::withFloor();
+        json node = {{"name", "group"}};
+        if (camera) {
+            level.document["cameras"] = {{{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.1}}}}};
+            node["camera"] = 0;
+        }
+        const int group = level.addNode(node);
+        const std::pair<const char*, json> keys[] = {{"dimmer_texel_density", 8},
+                                                     {"dimmer_grid_spacing", 1},
+                                                     {"dimmer_lighting", "none"},
+                                                     {"dimmer_bake", "full"},
+                                                     {"dimmer_max_weight", 2}};
+        for (const auto& [key, value] : keys) {
+            level.node(group)["extras"] = {{key, value}};
+            const auto scene = level.import();
+            ASSERT_IMPORTED(scene);
+            EXPECT_EQ(scene->warnings.size(), 1u) << key;
+            expectWarning(*scene, {"node 'group'", std::string("'") + key + "'", "ignored"});
+        }
+        level.node(group)["extras"] = {{"dimmer_bake", "ful"}};
+        expectBadInput(level.import(), {"node 'group'", "dimmer_bake", "'ful'"});
+        level.node(group)["extras"] = {{"dimmer_lighting", "dynamic"}};  // a place for what moves
+        const auto place = level.import();
+        ASSERT_IMPORTED(place);
+        EXPECT_TRUE(place->warnings.empty());
+        EXPECT_EQ(place->dynamic_places.size(), 1u);
+    }
+    LevelFile lamp = levelWithLamp({{"dimmer_lighting", "dynamic"}});
+    const auto scene = lamp.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'lamp'", "'dimmer_lighting'", "meshes"});
+}
+
 TEST(SceneElements, DensityHasALimit) {
     LevelFile level = LevelFile::withFloor();
     level.node(0)["extras"] = {{"dimmer_texel_density", 256}};
@@ -80,7 +116,8 @@ TEST(SceneElements, DensityHasALimit) {
 
 TEST(SceneElements, BlendersOrientationNodeTakesTheObjectsProperties) {
     LevelFile level = LevelFile::withFloor();
-    const int object = level.addNode({{"name", "Lamp"}, {"extras", {{"dimmer_light_set", "hall"}}}});
+    const int object =
+        level.addNode({{"name", "Lamp"}, {"extras", {{"dimmer_light_set", "hall"}, {"dimmer_bake", "full"}}}});
     level.addLight("Lamp_Orientation", point_light);
     const int orientation = object + 1;
     level.document["scenes"][0]["nodes"].erase(level.document["scenes"][0]["nodes"].size() - 1);
@@ -88,6 +125,8 @@ TEST(SceneElements, BlendersOrientationNodeTakesTheObjectsProperties) {
     const auto scene = level.import();
     ASSERT_IMPORTED(scene);
     EXPECT_EQ(scene->lights[0].light_set, 0u);
+    EXPECT_EQ(scene->lights[0].bake, BakeMode::Full);
+    EXPECT_TRUE(scene->warnings.empty());
 }
 
 TEST(SceneElements, EmissiveMeshOfASet) {
@@ -272,6 +311,26 @@ TEST(SceneElements, PosesOfOneDoorAddUpDownTheTree) {
     EXPECT_NEAR(glm::distance(moved(4), glm::dvec4(3, 0, 0, 1)), 0, 1e-12);
 }
 
+// An object named the door, its mesh below got the pose: the door stays shut, and the message says where to write what.
+TEST(SceneElements, APoseWithoutItsDoorIsWarnedOf) {
+    LevelFile level = LevelFile::withFloor();
+    const int door = level.addNode({{"name", "frame"}, {"extras", {{"dimmer_door", "front"}}}});
+    const int leaf = level.addNode({{"name", "leaf"},
+                                    {"mesh", level.addSquareMesh(0)},
+                                    {"extras", {{"dimmer_door_open", "pose"}, {"dimmer_door_rotation", {0, 1, 0, 1}}}}},
+                                   door);
+    auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 2u);
+    expectWarning(*scene, {"node 'leaf'", "'dimmer_door_open'", "'dimmer_door'"});
+    expectWarning(*scene, {"node 'leaf'", "'dimmer_door_rotation'", "'dimmer_door'"});
+    level.node(leaf)["extras"]["dimmer_door"] = "front";
+    scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_TRUE(scene->warnings.empty());
+    EXPECT_TRUE(scene->doors[0].pose);
+}
+
 TEST(SceneElements, APoseThatIsNotStatedIsWarnedOf) {
     LevelFile level = LevelFile::withFloor();
     level.addNode({{"name", "leaf"},
@@ -332,7 +391,7 @@ TEST(SceneElements, CombinationsOfUnknownElementsAreRefused) {
 }
 
 TEST(SceneElements, NamesThatAStateCannotSayAreRefused) {
-    for (const char* name : {" hall", "hall ", " ", "", "a,b", "a=b", "all", "door:x"})
+    for (const char* name : {" hall", "hall ", " ", "", "a,b", "a=b", "all", "always", "door:x"})
         expectBadInput(levelWithLamp({{"dimmer_light_set", name}}).import(), {"node 'lamp'", name});
 }
 

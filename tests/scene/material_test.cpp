@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <scene/expectations.h>
 #include <stb/stb_image_write.h>
 
@@ -164,6 +165,29 @@ TEST(SceneMaterials, TextureTransformAndSet) {
     expectWarning(*scene, {"node 'poster'", "TEXCOORD_7"});
 }
 
+TEST(SceneMaterials, TextureTransformsOfTheWrongTypeAreRefused) {
+    const std::pair<json, const char*> cases[] = {{{{"offset", {1, 2, 3}}}, "'offset'"},
+                                                  {{{"offset", 1}}, "'offset'"},
+                                                  {{{"offset", {"a", 0}}}, "'offset'"},
+                                                  {{{"scale", "2"}}, "'scale'"},
+                                                  {{{"scale", {2}}}, "'scale'"},
+                                                  {{{"rotation", "90"}}, "'rotation'"},
+                                                  {{{"rotation", json::array()}}, "'rotation'"},
+                                                  {{{"texCoord", -1}}, "'texCoord'"},
+                                                  {{{"texCoord", 0.5}}, "'texCoord'"},
+                                                  {{{"texCoord", 4294967296}}, "'texCoord'"},
+                                                  {{{"offset", {4294967296, 0}}}, "'offset'"},
+                                                  {json::array({1}), "'KHR_texture_transform'"}};
+    for (const auto& [transform, key] : cases) {
+        SCOPED_TRACE(transform.dump());
+        expectBadInput(levelWithPoster({{"extensions", {{"KHR_texture_transform", transform}}}}, red_and_grey).import(),
+                       {"material 'picture'", key});
+    }
+    for (const uint64_t set : {uint64_t{4294967295}, uint64_t{4294967296}})
+        expectBadInput(levelWithPoster({{"texCoord", set}}, red_and_grey).import(),
+                       {"material 'picture'", "'texCoord'", std::to_string(set)});
+}
+
 TEST(SceneMaterials, EmissiveAndMetalTexturesCountWithTheirMean) {
     LevelFile level = LevelFile::withFloor();
     const int texture = addTexture(level, {255, 0, 0, 255, 0, 0, 255, 255});
@@ -180,6 +204,23 @@ TEST(SceneMaterials, EmissiveAndMetalTexturesCountWithTheirMean) {
     expectWarning(*scene, {"material 'half'", "metalness"});
 }
 
+// Programs write image/jpg and others beside the two types that glTF names: the bytes say what it is.
+TEST(SceneMaterials, DataOfAnyMediaTypeIsAnImageWhereItsBytesAre) {
+    LevelFile level = LevelFile::withFloor();
+    // One white texel.
+    const std::string png_base64 =
+        "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8/5+hHgAHggJ/PchI7wAAAABJRU5ErkJggg==";
+    level.document["textures"] = json::array({{{"source", 0}}});
+    level.document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = {{"index", 0}};
+    for (const char* type : {"image/png", "image/jpg", "IMAGE/PNG;charset=utf-8", ""}) {
+        level.document["images"] = json::array({{{"uri", fmt::format("data:{};base64,{}", type, png_base64)}}});
+        const auto scene = level.import();
+        ASSERT_IMPORTED(scene);
+        ASSERT_EQ(scene->textures.size(), 1u) << type;
+        EXPECT_EQ(scene->textures[0]->width, 1u);
+    }
+}
+
 TEST(SceneMaterials, UnusableImagesAreRefused) {
     LevelFile level = levelWithPoster(json::object(), red_and_grey);
     json& image = level.document["images"][0];
@@ -193,6 +234,13 @@ TEST(SceneMaterials, UnusableImagesAreRefused) {
     level.document["nodes"].back()["mesh"] = level.document["meshes"].size() - 1;
     image = {{"name", "picture"}, {"uri", "data:image/png;base64,AAAAAAAAAAAAAAAA"}};
     expectBadInput(level.import(), {"material 'picture'", "neither PNG nor JPEG"});
+    // The name of a media type is no matter; what is none of base64 is not printed whole.
+    image = {{"name", "picture"}, {"uri", "data:image/jpg;base64," + std::string(5000, 'A')}};
+    expectBadInput(level.import(), {"material 'picture'", "neither PNG nor JPEG"});
+    EXPECT_LT(level.import().error().message.size(), 500u);
+    image = {{"name", "picture"}, {"uri", "data:image/jpg," + std::string(5000, 'A')}};
+    expectBadInput(level.import(), {"material 'picture'", "data URI", "base64"});
+    EXPECT_LT(level.import().error().message.size(), 500u);
     image = good;
     level.document["bufferViews"][view]["byteLength"] = 40;  // ends inside the header of the pixels
     expectBadInput(level.import(), {"material 'picture'", "damaged"});

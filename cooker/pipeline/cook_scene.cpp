@@ -1,0 +1,134 @@
+// cookScene: from a scene in memory to a pack in memory.
+#include <pipeline/cook.h>
+
+#include <bake/buried_lights.h>
+#include <bake/overlap.h>
+#include <bake/sampling.h>
+#include <charts/texels.h>
+#include <models/self_visibility.h>
+#include <pipeline/charted_level.h>
+#include <pipeline/cook_settings.h>
+#include <pipeline/cook_warnings.h>
+#include <pipeline/encode_pack.h>
+
+#include <fmt/format.h>
+
+namespace dimmer::cook {
+namespace {
+
+// The level with its charts and receivers.
+struct Receivers {
+    Receivers(Scene scene, const Profile& profile) : level(std::move(scene), profile) {}
+    ChartedLevel level;
+    Texels texels;
+    Key key;
+};
+
+// From the cache or anew.
+Expected<void> findReceivers(const Profile& profile, const Quality& quality, CookCache* cache, Receivers& out) {
+    ChartedLevel& level = out.level;
+    if (cache) {
+        const Key geometry = geometryKey(level.scene);
+        out.key = chartsKey(geometry, unwrapOptions(profile), quality.samples_per_texel);
+        cache->dependsOn("geometry", geometry);
+        cache->dependsOn("settings of charts", chartsKey({}, unwrapOptions(profile), quality.samples_per_texel));
+        std::vector<SceneMesh>& meshes = level.scene.meshes;
+        if (auto found = cache->findCharts(out.key); found && found->meshes.size() == meshes.size()) {
+            for (size_t m = 0; m < meshes.size(); ++m) takeGeometry(meshes[m], std::move(found->meshes[m]));
+            level.charts = std::move(found->charts);
+            out.texels = std::move(found->texels);
+            level.rays.emplace(level.scene);
+            return {};
+        }
+    }
+    if (auto ok = level.chart(profile); !ok) return ok;
+    out.texels = sampleTexels(*level.rays, level.charts, quality.samples_per_texel);
+    if (cache) cache->keepCharts(out.key, {level.scene.meshes, level.charts, out.texels});
+    return {};
+}
+
+// Of where things are. Entries of a cache name no nodes: this is said in every cook.
+void warnOfPlaces(const ChartedLevel& level, CookStats& stats) {
+    const auto buried = warningsOfBuriedLights(*level.rays);
+    stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
+    if (auto warning = farFromOrigin(*level.rays)) stats.warnings.push_back(std::move(*warning));
+    for (const ChartWarning& w : level.charts.warnings)
+        stats.warnings.push_back(
+            fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));
+}
+
+Baked bakeWithCache(const Receivers& at, BakeSettings settings, Progress& progress, CookCache* cache) {
+    const ChartedLevel& level = at.level;
+    for (const glm::vec3 scale : level.scales.of_group) settings.group_brightness.push_back(luminance(scale));
+    if (!cache) return bake(*level.rays, level.charts, at.texels, settings, progress);
+    const Scene& scene = level.scene;
+    const Key settings_key = bakeSettingsKey(settings);
+    cache->dependsOn("settings of the bake", settings_key);
+    std::vector<Key> keys;
+    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) {
+        const Key lamps = lampsKey(scene, g);
+        cache->dependsOn("lamps of " + describeGroup(scene, g), lamps);
+        keys.push_back(groupKey(at.key, settings_key, settings.thresholdOf(g), lamps));
+        cache->dependsOn("threshold of " + describeGroup(scene, g),
+                         KeyBuilder("").add(settings.thresholdOf(g)).finish());
+    }
+    const Key grid_settings = gridSettingsKey(settings.grid, scene);
+    cache->dependsOn("settings of the grid", grid_settings);
+    const Key lamp_order = lampOrderKey(scene);
+    cache->dependsOn(lamp_order_part, lamp_order);
+    const Key grid = gridKey(grid_settings, lamp_order, keys);
+    CachedGroups groups(*cache, scene, std::move(keys), grid, sceneRaysKey(at.key, settings_key, scene));
+    return bake(*level.rays, level.charts, at.texels, settings, progress, &groups);
+}
+
+}  // namespace
+
+Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality_name, Progress& progress,
+                             CookStats& stats, CookCache* cache, LossTable* losses) {
+    const Quality* quality = profile.quality(quality_name);
+    if (!quality)
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("there is no quality '{}'; take draft, preview or final", quality_name));
+    Receivers at(std::move(scene), profile);
+    ChartedLevel& level = at.level;
+    {
+        const Stopwatch watch(stats.seconds["charts"]);
+        progress.stage("charts", 2);
+        if (auto ok = findReceivers(profile, *quality, cache, at); !ok) return std::unexpected(ok.error());
+        progress.advance(1);
+        findTransfers(level.scene);
+        warnOfPlaces(level, stats);
+        progress.advance(1);
+    }
+    if (at.texels.size() == 0)
+        return fail(ErrorCode::BadInput, level.scene.file +
+                                             ": every surface lies inside closed geometry, facing inwards; "
+                                             "check the winding of the level's triangles");
+    Baked baked;
+    {
+        const Stopwatch watch(stats.seconds["bake"]);
+        const BakeSettings settings = bakeSettings(profile, *quality, level.scene);
+        StageTimer timer(progress, stats.bake_seconds);
+        baked = bakeWithCache(at, settings, timer, cache);
+        multiplyByScales(level.scales, baked);
+        // Before the limit: what it drops comes back where higher thresholds make room.
+        if (losses)
+            *losses = LossTable(baked, at.texels, settings.group_thresholds, profile.overlap_max,
+                                chartSizes(*level.rays, level.charts, profile.page_size));
+        limitOverlap(baked, at.texels.area_m2, profile.overlap_max);
+    }
+    stats.rays += baked.rays;
+    stats.bounces = baked.bounces;
+    for (const std::string& w : baked.warnings) stats.warnings.push_back(level.scene.file + ": " + w);
+    PackData pack;
+    {
+        const Stopwatch watch(stats.seconds["encode"]);
+        progress.stage("encode", 1);
+        pack = encodePack(level, at.texels, baked, profile, quality_name, stats);
+        progress.advance(1);
+    }
+    progress.finish();
+    return pack;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,71 @@
+#include <pipeline/cook_within.h>
+
+#include <pipeline/settings.h>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <span>
+
+namespace dimmer::cook {
+namespace {
+
+// The cheapest ways out of a budget that a message names.
+constexpr size_t remedies_named = 3;
+
+// Each round of `--fit` cooks anew: more than a few mean that something does not follow its prediction.
+constexpr int fit_rounds_max = 6;
+
+// Those that are enough come first, so that a first one that is not tells of all.
+std::string waysOut(const std::vector<Remedy>& found) {
+    if (found.empty()) return "; no setting would mend it";
+    std::string text = found[0].fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
+    for (const Remedy& remedy : std::span(found).first(std::min<size_t>(found.size(), remedies_named)))
+        text += "\n  " + remedy.text() + (found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
+    return text;
+}
+
+// The figures of an error are those of the last cook, not of the settings that were asked for.
+std::string changedBefore(const std::vector<Remedy>& fitted) {
+    std::string text = fitted.empty() ? "" : "\n--fit had changed before this cook:";
+    for (const Remedy& remedy : fitted) text += "\n  " + remedy.text();
+    return text;
+}
+
+}  // namespace
+
+Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
+                              CookCache* cache, CookResult& result) {
+    const std::vector<std::string> import_warnings = result.stats.warnings;
+    for (int round = 0;; ++round) {
+        result.stats.warnings = import_warnings;
+        result.stats.suggested_combinations.clear();
+        LossTable losses;
+        auto pack = cookScene(scene, result.profile, quality, progress, result.stats, cache, &losses);
+        if (!pack) return pack;
+        const PackCost cost = costOf(*pack);
+        const auto within = checkBudgets(*pack, cost, result.profile);
+        if (within) return pack;
+        if (!fit || round + 1 == fit_rounds_max) {
+            return fail(ErrorCode::OverBudget, within.error().message +
+                                                   waysOut(remedies(*pack, cost, result.profile, losses)) +
+                                                   changedBefore(result.fitted));
+        }
+        const auto density_steps =
+            std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
+        Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
+        if (remedy.changes.empty()) {
+            const auto found = remedies(*pack, cost, result.profile, losses);
+            const char* why = found.empty() ? "; nothing that --fit changes would help"
+                                            : "; all that --fit changes would not be enough";
+            return fail(ErrorCode::OverBudget,
+                        within.error().message + why + waysOut(found) + changedBefore(result.fitted));
+        }
+        for (const Change& c : remedy.changes)
+            if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
+                return std::unexpected(ok.error());
+        result.fitted.push_back(std::move(remedy));
+    }
+}
+
+}  // namespace dimmer::cook

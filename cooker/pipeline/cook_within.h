@@ -1,0 +1,13 @@
+// `cook --fit`: cooks until the pack is within its budgets.
+#pragma once
+
+#include <pipeline/cook.h>
+
+namespace dimmer::cook {
+
+// Cooks by result.profile, and with `fit` changes that and cooks again until the pack is within its budgets; what was
+// changed goes into result.fitted. An error of ErrorCode::OverBudget names the ways out.
+Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
+                              CookCache* cache, CookResult& result);
+
+}  // namespace dimmer::cook
