@@ -301,7 +301,7 @@ def refresh(topic, measure):
 def main():
     parser = argparse.ArgumentParser(prog="scripts/bench bake", description=__doc__.splitlines()[0])
     parser.add_argument("--levels", nargs="*", default=["two_rooms", "lq_old_start", "lq_e2m2", "lq_e2m3"])
-    parser.add_argument("--quality", default="draft", choices=["draft", "preview", "final"])
+    parser.add_argument("--quality", default="draft", choices=["draft", "final"])
     parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")

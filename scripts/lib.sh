@@ -4,11 +4,13 @@ packages=(
     g++ cmake ninja-build ccache pkg-config python3
     libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
     libglm-dev libembree-dev libtbb-dev libzstd-dev libxxhash-dev
-    libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev libspdlog-dev
+    libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev
     libtet1.5-dev libmeshoptimizer-dev
     libgtest-dev libgmock-dev  # CMake looks for all that its targets need, whichever is built
 )
-test_packages=(clang-format)
+bench_packages=(libbenchmark-dev)
+test_packages=(clang-format "${bench_packages[@]}")
+bench_programs=(dimmer_bench dimmer_update_bench dimmer_pack_bench)  # of bench/
 
 # Installs what is missing of the given Debian packages; says what; does nothing when all is there.
 install_packages() {

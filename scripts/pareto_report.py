@@ -157,8 +157,8 @@ def report(levels, defaults):
     """`levels`: (name, quality, lightmap figures, grid figures, error by cause) each; `defaults`: profile -> key of its settings."""
     body = ["<h1>Run time against error</h1>",
             "<p>Each point is a level cooked with other settings: hover, or touch, for which. The red line joins those "
-            "that no other beats in both; circles mark what the shipped profiles set. Mean relative error over five "
-            "states; both axes are logarithmic.</p>",
+            "that no other beats in both; circles mark what the shipped profiles set. The mean error is that over "
+            "the states that have light; both axes are logarithmic.</p>",
             '<p class="key">' + "".join(f'<span><i style="background:{c}"></i>{d} texels a metre</span>'
                                         for d, c in DENSITY_COLOURS.items()) + "</p>"]
     for name, quality, figures, grids, causes in levels:
