@@ -10,6 +10,7 @@
 namespace dimmer::cook {
 namespace {
 
+constexpr uint32_t not_a_member = UINT32_MAX;
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
 constexpr float fit_tolerance = 0.01f;  // errors of interpolation are several times that
@@ -54,13 +55,13 @@ std::vector<std::vector<SiteTerm>> byTerm(const Sparse<ProbeTermLight>& light, s
 class TermFit {
    public:
     TermFit(const Placement& placed, std::span<const SiteTerm> light)
-        : placed_(placed), light_(light), number_(placed.place_of.size(), no_probe) {}
+        : placed_(placed), light_(light), number_(placed.place_of.size(), not_a_member) {}
 
     void fit(uint32_t term, std::vector<std::vector<ProbeTermLight>>& rows) {
         std::vector<ProbeTermLight*> members;
         for (uint32_t i = 0; i < rows.size(); ++i) {
             const auto found = std::ranges::find(rows[i], term, &ProbeTermLight::term);
-            number_[i] = found == rows[i].end() ? no_probe : static_cast<uint32_t>(members.size());
+            number_[i] = found == rows[i].end() ? not_a_member : static_cast<uint32_t>(members.size());
             if (found != rows[i].end()) members.push_back(&*found);
         }
         if (members.empty()) return;
@@ -71,7 +72,8 @@ class TermFit {
         for (size_t s = 0; s < sites_.size(); ++s) sites_[s].importance = importanceOf(targets_[s], floor);
         std::vector<float> own;
         for (size_t i = 0; i < number_.size(); ++i)
-            if (number_[i] != no_probe) own.push_back(placed_.guessed[i] ? 0 : importanceOf(probes[number_[i]], floor));
+            if (number_[i] != not_a_member)
+                own.push_back(placed_.guessed[i] ? 0 : importanceOf(probes[number_[i]], floor));
         fitProbes(sites_, targets_, probes, fit_tolerance, own);
         for (size_t i = 0; i < members.size(); ++i)
             members[i]->light.radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
@@ -87,13 +89,13 @@ class TermFit {
             while (lit != light_.end() && lit->site < s) ++lit;
             // Most terms are of few probes, and most sites none of theirs.
             const auto& around = placed_.sites[s].probes;
-            if (std::ranges::none_of(around, [&](uint32_t p) { return number_[p] != no_probe; })) continue;
+            if (std::ranges::none_of(around, [&](uint32_t p) { return number_[p] != not_a_member; })) continue;
             FitSite site = placed_.sites[s];
             float known = 0;
             for (size_t k = 0; k < 4; ++k) {
                 const uint32_t number = number_[site.probes[k]];
-                if (number == no_probe) site.shares[k] = 0;
-                site.probes[k] = number == no_probe ? 0 : number;
+                if (number == not_a_member) site.shares[k] = 0;
+                site.probes[k] = number == not_a_member ? 0 : number;
                 known += site.shares[k];
             }
             if (!(known > 0)) continue;

@@ -66,6 +66,10 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
                                     .compute_queue = vulkan->compute_queue,
                                     .compute_queue_family = vulkan->compute_queue_family,
                                     .get_instance_proc_addr = vulkan->get_instance_proc_addr};
+        if (buffering != DIMMER_IN_PLACE && buffering != DIMMER_DOUBLE_BUFFERED)
+            return report({ErrorCode::InvalidArgument,
+                           fmt::format("{} is no dimmer_buffering; it is DIMMER_IN_PLACE or DIMMER_DOUBLE_BUFFERED",
+                                       static_cast<int>(buffering))});
         RuntimeOptions options;
         options.buffering = buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace;
         options.moving_probes_max = moving_probes_max;

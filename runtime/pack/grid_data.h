@@ -10,7 +10,6 @@
 namespace dimmer {
 
 inline constexpr uint32_t no_tetrahedron = UINT32_MAX;
-inline constexpr uint32_t no_probe = UINT32_MAX;
 
 struct ProbePosition {
     float x_m = 0, y_m = 0, z_m = 0;  // world space
@@ -57,10 +56,10 @@ struct GlobalGrid {
 // Probes in an oriented box around a model: probe (i, j, k), number first_probe + i + counts[0] * (j + counts[1] * k),
 // stands at origin + i * step[0] + j * step[1] + k * step[2].
 struct LocalGrid {
-    std::string node;                 // of the level
-    uint32_t first_probe = no_probe;  // no_probe: a thing that moves; the runtime fills its probes
+    std::string node;  // of the level
+    uint32_t first_probe = 0;
     std::array<uint32_t, 3> counts = {};
-    std::array<float, 3> origin_m = {};  // world space; of what moves, as the level has it
+    std::array<float, 3> origin_m = {};  // world space
     std::array<std::array<float, 3>, 3> step_m = {};
     uint64_t probeCount() const { return uint64_t{counts[0]} * counts[1] * counts[2]; }
 };

@@ -63,7 +63,7 @@ struct ReceiverView {
     std::span<const Cluster> clusters;
     std::span<const ClusterTerm> terms;
     std::span<const Batch> batches;
-    uint32_t record_bytes = 0;
+    uint32_t record_bytes = 0, place_bytes = 0;  // that kernels move per receiver
 };
 
 // The light probes of a level: receivers like texels, with clusters of their own.
@@ -77,7 +77,7 @@ struct ProbeData {
     std::vector<ProbeRecord> payload;     // contribution-major
     GlobalGrid global;                    // of the first probes
     std::vector<LocalGrid> local;         // of the others
-    ReceiverView view() const { return {clusters, terms, batches, sizeof(ProbeRecord)}; }
+    ReceiverView view() const { return {clusters, terms, batches, sizeof(ProbeRecord), sizeof(uint32_t)}; }
 };
 
 struct PackData {
@@ -100,7 +100,8 @@ struct PackData {
     std::vector<PlacedModel> models;
     std::string settings_json;  // every resolved setting of the cook and where it came from
 
-    ReceiverView texelView() const { return {clusters, terms, batches, sizeof(TexelRecord)}; }
+    // Texels' places are those in their batch, a byte each.
+    ReceiverView texelView() const { return {clusters, terms, batches, sizeof(TexelRecord), 1}; }
 };
 
 // Checks everything that an executor relies on: every index in range, clusters and batches tile the receivers,

@@ -225,8 +225,7 @@ Expected<void> validateLocalGrids(const PackData& d) {
         if (!finite(grid.origin_m) || !std::ranges::all_of(grid.step_m, [](const auto& s) { return finite(s); }))
             return unusable("local grid '{}' is not finite", grid.node);
         const uint64_t first = d.probes.global.positions.size(), end = d.probes.base.size();
-        if (grid.first_probe != no_probe &&
-            (grid.first_probe < first || grid.first_probe > end || grid.probeCount() > end - grid.first_probe))
+        if (grid.first_probe < first || grid.first_probe > end || grid.probeCount() > end - grid.first_probe)
             return unusable("local grid '{}' has probes that are not there", grid.node);
     }
     return {};
@@ -282,8 +281,7 @@ Expected<void> validateModels(const PackData& d) {
     for (const PlacedModel& m : d.models) {
         if (m.first_mesh > d.model_meshes.size() || m.mesh_count > d.model_meshes.size() - m.first_mesh)
             return unusable("model '{}' has meshes that are not there", m.node);
-        if (m.local_grid &&
-            (*m.local_grid >= d.probes.local.size() || d.probes.local[*m.local_grid].first_probe == no_probe))
+        if (m.local_grid && *m.local_grid >= d.probes.local.size())
             return unusable("model '{}' has a light grid that is not there", m.node);
         if (!std::ranges::all_of(m.world_from_model.rows, [](const auto& row) { return finite(row); }) ||
             !finite(m.min_m) || !finite(m.max_m))

@@ -285,7 +285,7 @@ void Planner::planPart(Part& part) {
     ++stats_.clusters;
     stats_.batches += part.batch_count;
     stats_.receivers += receivers;
-    stats_.bytes_read += receivers * (sizeof(uint32_t) + receivers_.record_bytes * (1 + part.term_count));
+    stats_.bytes_read += receivers * (receivers_.place_bytes + receivers_.record_bytes * (1 + part.term_count));
     stats_.bytes_written += receivers * receivers_.record_bytes;
 }
 

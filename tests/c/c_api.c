@@ -252,6 +252,7 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     dimmer_update_stats stats;
     dimmer_images images;
     VkSemaphore semaphore = VK_NULL_HANDLE;
+    VkBuffer probes = VK_NULL_HANDLE, grid_table = VK_NULL_HANDLE;
     uint64_t value = 0;
     const uint32_t *own_irradiance, *own_direction;
     size_t own_count;
@@ -259,7 +260,11 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     uint32_t* by_submit = malloc(8 * texel_count);
     EXPECT(by_submit != NULL);
     EXPECT_OK(dimmer_pack_open(path, &pack));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2 is no dimmer_buffering",
+                   dimmer_lights_create_vulkan(pack, vulkan, (dimmer_buffering)2, 0, &lights));
     EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_IN_PLACE, 0, &lights));
+    EXPECT_OK(dimmer_lights_get_probe_buffers(lights, &probes, &grid_table));
+    EXPECT(probes == VK_NULL_HANDLE && grid_table == VK_NULL_HANDLE);
     if ((failed = set_state(pack, lights)) != 0) return failed;
     EXPECT_OK(dimmer_lights_submit(lights, NULL));
     EXPECT_OK(dimmer_lights_wait(lights, &stats));
@@ -284,6 +289,27 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     EXPECT(memcmp(by_submit, irradiance, 4 * texel_count) == 0);
     EXPECT(memcmp(by_submit + texel_count, direction, 4 * texel_count) == 0);
     free(by_submit);
+    dimmer_lights_destroy(lights);
+    dimmer_pack_close(pack);
+    return 0;
+}
+
+int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan) {
+    dimmer_pack* pack = NULL;
+    dimmer_lights* lights = NULL;
+    VkBuffer probes[3] = {VK_NULL_HANDLE}, tables[3] = {VK_NULL_HANDLE};
+    int i;
+    EXPECT_OK(dimmer_pack_open(path, &pack));
+    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_DOUBLE_BUFFERED, 0, &lights));
+    for (i = 0; i < 3; ++i) {
+        EXPECT_OK(dimmer_lights_apply(lights, i % 2 ? "all=0.5" : "all=0.25"));
+        EXPECT_OK(dimmer_lights_submit(lights, NULL));
+        EXPECT_OK(dimmer_lights_get_probe_buffers(lights, &probes[i], &tables[i]));
+        EXPECT_OK(dimmer_lights_wait(lights, NULL));
+        EXPECT(probes[i] != VK_NULL_HANDLE && tables[i] != VK_NULL_HANDLE && tables[i] == tables[0]);
+    }
+    EXPECT(probes[1] != probes[0] && probes[2] == probes[0]);
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_get_probe_buffers(lights, probes, NULL));
     dimmer_lights_destroy(lights);
     dimmer_pack_close(pack);
     return 0;

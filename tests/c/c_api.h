@@ -23,6 +23,8 @@ int light_a_model(const char* path, float before_lux[3], float after_lux[3], flo
 /* The same state on a Vulkan device, first by submit, then, with all sets off between, by record. */
 int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irradiance, uint32_t* direction,
                     size_t texel_count);
+/* The buffers of probes, of a pack with a global grid that has dynamic light, by turns after each update. */
+int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan);
 /* The example of docs/integrate.md. */
 int shade_player(const char* path, float lux[3]);
 

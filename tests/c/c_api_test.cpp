@@ -92,16 +92,19 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL countingLoader(VkInstance instance, con
     return vkGetInstanceProcAddr(instance, name);
 }
 
+dimmer_vulkan vulkanOf(const VulkanContext& context) {
+    return {.instance = context.instance,
+            .physical_device = context.physical_device,
+            .device = context.device,
+            .queue = context.queue,
+            .queue_family = context.queue_family,
+            .compute_queue = VK_NULL_HANDLE,
+            .compute_queue_family = 0,
+            .get_instance_proc_addr = countingLoader};
+}
+
 TEST_F(CInterfaceGpu, BlendsByVulkan) {
-    const VulkanContext context = device().context();
-    const dimmer_vulkan vulkan{.instance = context.instance,
-                               .physical_device = context.physical_device,
-                               .device = context.device,
-                               .queue = context.queue,
-                               .queue_family = context.queue_family,
-                               .compute_queue = VK_NULL_HANDLE,
-                               .compute_queue_family = 0,
-                               .get_instance_proc_addr = countingLoader};
+    const dimmer_vulkan vulkan = vulkanOf(device().context());
     BlendedPages pages;
     ASSERT_EQ(
         blend_on_vulkan(PackOnDisk().path.c_str(), &vulkan, pages.irradiance.data(), pages.direction.data(), 2048), 0)
@@ -110,6 +113,16 @@ TEST_F(CInterfaceGpu, BlendsByVulkan) {
     const BlendedPages expected = expectedPages();
     EXPECT_EQ(pages.irradiance, expected.irradiance);
     EXPECT_EQ(pages.direction, expected.direction);
+}
+
+TEST_F(CInterfaceGpu, NamesTheBuffersOfProbes) {
+    const cook::test::TemporaryFolder folder;
+    PackData data = modelPack(1, 20, [](glm::vec3) { return glm::vec3(1); });
+    addLightOnProbes(data, 0, encodeE5B9G9R9(1, 1, 1), [](glm::vec3) { return true; });
+    const auto path = folder.path / "grid.dimmer";
+    ASSERT_TRUE(cook::writeFileAtomically(path, cook::packBytes(data)));
+    const dimmer_vulkan vulkan = vulkanOf(device().context());
+    EXPECT_EQ(probe_buffers_take_turns(path.c_str(), &vulkan), 0) << problem;
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
 
-// samplePack() with probes: 50 in a global grid, 12 in a local one, and a thing that moves.
+// samplePack() with probes: 50 in a global grid, 12 in local ones that share the last.
 PackData gridPack(uint32_t seed = 1) {
     Random random(seed);
     PackData data = samplePack(seed);
@@ -36,7 +36,7 @@ PackData gridPack(uint32_t seed = 1) {
         for (auto& probe : v.seen)
             for (int8_t& value : probe) value = static_cast<int8_t>(pick(random, 0, 255));
     data.probes.local = {{"crate", 50, {2, 3, 2}, {1, 2, 3}, {{{0.5f, 0, 0}, {0, 0.25f, 0}, {0, 0, 1}}}},
-                         {"ball", no_probe, {1, 1, 1}, {0, 1, 0}, {}}};
+                         {"ball", 61, {1, 1, 1}, {0, 1, 0}, {}}};
     return data;
 }
 
@@ -65,7 +65,7 @@ TEST(GridPack, EveryFieldComesBack) {
     EXPECT_EQ(b.local[0].counts, (std::array<uint32_t, 3>{2, 3, 2}));
     EXPECT_EQ(b.local[0].origin_m, (std::array<float, 3>{1, 2, 3}));
     EXPECT_EQ(b.local[0].step_m, a.local[0].step_m);
-    EXPECT_EQ(b.local[1].first_probe, no_probe);
+    EXPECT_EQ(b.local[1].first_probe, 61u);
 }
 
 TEST(GridPack, ALocalGridThatIsNotThereHasNoProbes) {

@@ -186,7 +186,7 @@ TEST(Planner, CountsAreThoseOfTheClusters) {
         ++expected.clusters;
         expected.batches += (c.receiver_count + 63) / 64;
         expected.receivers += c.receiver_count;
-        expected.bytes_read += uint64_t{c.receiver_count} * (4 + 8 + 8 * c.term_count);
+        expected.bytes_read += uint64_t{c.receiver_count} * (1 + 8 + 8 * c.term_count);
         expected.bytes_written += uint64_t{c.receiver_count} * 8;
     }
     ASSERT_GT(expected.clusters, 0u);

@@ -270,8 +270,9 @@ typedef enum dimmer_buffering {
 } dimmer_buffering;
 
 /* DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue may be), a queue family that the device does not have, or
- * one without compute. DIMMER_UNSUPPORTED: a device below Vulkan 1.2, or one without a format or limit that the pack
- * needs; a loader without a function of Vulkan 1.2, or another one than lights have that live. */
+ * one without compute; a `buffering` that is none. DIMMER_UNSUPPORTED: a device below Vulkan 1.2, or one without a
+ * format or limit that the pack needs; a loader without a function of Vulkan 1.2, or another one than lights have that
+ * live. */
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
                                           dimmer_buffering buffering, uint32_t moving_probes_max,
                                           dimmer_lights** lights);

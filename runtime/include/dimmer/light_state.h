@@ -56,10 +56,6 @@ struct UpdateLimits {
 // smaller) and every door is closed.
 class LightState {
    public:
-    ~LightState();
-    LightState(LightState&&) noexcept;
-    LightState& operator=(LightState&&) noexcept;
-
     Expected<LightSet> lightSet(std::string_view name) const;
     Expected<Door> door(std::string_view name) const;
 
@@ -91,6 +87,10 @@ class LightState {
     const Pack& pack() const { return pack_; }
 
    protected:
+    // Moved and destroyed as the runtime that it is, never as a part of it.
+    ~LightState();
+    LightState(LightState&&) noexcept;
+    LightState& operator=(LightState&&) noexcept;
     // One planner per set of pages: each knows what its own pages have yet to catch up on.
     explicit LightState(const Pack& pack, uint32_t page_sets = 1, uint32_t moving_probes_max = 0);
     Planner& planner(uint32_t page_set = 0) { return *planners_[page_set]; }

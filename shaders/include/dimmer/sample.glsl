@@ -48,8 +48,8 @@ mat3 dimmer_tangent_frame(vec3 normal, vec3 dp_du, vec3 dp_dv) {
 }
 
 #ifndef DIMMER_NO_DERIVATIVES
-// The same in a fragment shader, from the screen-space derivatives of what is interpolated (so not with uniform control
-// flow broken, and flat across a triangle).
+// The same in a fragment shader, from the screen-space derivatives of what is interpolated: call it in uniform control
+// flow. One frame for all of a triangle, but for the interpolated normal.
 //   position     of the surface, world space (any space: the frame is in the same one)
 //   normal       the mesh's unit normal, same space
 //   lightmap_uv  as in dimmer_lightmap_irradiance
