@@ -5,6 +5,7 @@
 
 #include <bake/door_guides.h>
 #include <bake/emitters.h>
+#include <bake/light_grid.h>
 #include <bake/ray_ends.h>
 #include <bake/sampling.h>
 #include <bake/sky.h>
@@ -133,6 +134,9 @@ struct DoorAims {
 // The face of points that lie on none: probes.
 inline constexpr uint32_t no_face = UINT32_MAX;
 
+// Texels from half a cell of the grid of lights on: their points lie in several.
+inline constexpr float wide_texel_m2 = 0.25f * LightGrid::cell_min_m * LightGrid::cell_min_m;
+
 // Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
 struct GatherFrom {
     std::span<const SamplePoint> points;
@@ -208,7 +212,9 @@ class Gatherer {
         }
         return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
                 static_cast<uint32_t>(receiver),
-                conditionOf(receiver)};
+                conditionOf(receiver),
+                no_model,
+                texels_.area_m2[receiver] > wide_texel_m2};
     }
     // no_condition but for the texels of doors' leaves.
     uint32_t conditionOf(size_t receiver) const {

@@ -13,8 +13,6 @@
 namespace dimmer::cook {
 namespace {
 
-// With smaller cells light is lost through openings between a lamp's rays.
-constexpr float cell_min_m = 2;
 // Lights further outside of the level are no lamps of its: their rays would miss it.
 constexpr float margin_m = 20;
 

@@ -21,6 +21,9 @@ inline constexpr uint32_t light_probe_rays = 4096;
 // far outside of the level, whose rays would miss it. What is said of a light depends on no other light.
 class LightGrid {
    public:
+    // With smaller cells light is lost through openings between a lamp's rays.
+    static constexpr float cell_min_m = 2;
+
     // Disabled, every light reaches everything. `groups`: per light group, whether its lights are asked for; empty:
     // all.
     explicit LightGrid(const RayScene& rays, bool enabled = true, std::span<const uint8_t> groups = {});

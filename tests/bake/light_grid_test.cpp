@@ -124,6 +124,23 @@ TEST(LightGrid, ClosedRoomsAreTheSameForTheRaysOfTheirOwnLamps) {
     EXPECT_GT(without.rays, 3 * with.rays);
 }
 
+// Texels of 5 m, and spots whose circles are no wider: a cell of the grid that lies elsewhere in the texel.
+TEST(LightGrid, NothingIsLostInTexelsWiderThanItsCells) {
+    Scene scene;
+    addFloor(scene, 40, addMaterial(scene, lambert(0.5f)));
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> across(-38, 38);
+    for (int i = 0; i < 40; ++i) {
+        PunctualLight& spot = addPointLight(scene, {across(random), 10, across(random)}, 100, BakeMode::Indirect);
+        spot.type = LightType::Spot;
+        spot.direction = {0, -1, 0};
+        spot.cone_inner_cos = 0.99f;
+        spot.cone_outer_cos = 0.98f;  // a circle of 2 m
+    }
+    const BakedScene b(scene, 0.2f, 16);
+    EXPECT_EQ(directOf(b, true).rows, directOf(b, false).rows);
+}
+
 // A long room, a black wall across it that leaves an opening of `width_m` at z = 1, and 60 lamps on its -X side.
 Scene lampsBehindAWall(float width_m) {
     Scene scene;
