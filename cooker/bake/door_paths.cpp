@@ -3,7 +3,7 @@
 #include <bake/sampling.h>
 
 #include <algorithm>
-#include <map>
+#include <bit>
 #include <set>
 
 namespace dimmer::cook {
@@ -98,22 +98,24 @@ DoorPaths::DoorPaths(const Scene& scene, std::span<const DoorIndices> closed_tog
     for (const auto& of_group : kept) all.insert(of_group.begin(), of_group.end());
     paths_.assign(all.begin(), all.end());
     std::ranges::stable_sort(paths_, {}, &Conditions::size);  // the free path first
-    std::map<Conditions, uint32_t> index;
-    for (const Conditions& path : paths_) index.emplace(path, static_cast<uint32_t>(index.size()));
-    const auto find = [&](const std::optional<Conditions>& path) {
-        const auto kept_path = path ? nearestKept(*path, index) : std::nullopt;
-        return kept_path ? index.at(*kept_path) : no_path;
-    };
-    for (const Conditions& path : paths_) {
-        for (uint32_t c = 0; c < condition_count_; ++c) {
-            with_.push_back(find(join(path, {c})));
-            needs_.push_back(std::ranges::binary_search(path, c));
-            Conditions rest = path;
+    for (const Conditions& path : paths_) path_at_.emplace(path, static_cast<uint32_t>(path_at_.size()));
+    for (uint32_t c = 0; c < condition_count_; ++c) single_.push_back(path_at_.at({c}));
+    needs_.resize(paths_.size() * condition_count_);
+    without_.resize(needs_.size());
+    for (uint32_t p = 0; p < paths_.size(); ++p) {
+        const size_t row = size_t{p} * condition_count_;
+        std::fill_n(without_.begin() + static_cast<ptrdiff_t>(row), condition_count_, p);
+        for (const uint32_t c : paths_[p]) {
+            Conditions rest = paths_[p];
             std::erase(rest, c);
-            without_.push_back(std::ranges::binary_search(path, c ^ 1) ? no_path : find(rest));
+            without_[row + c] = find(rest);
+            without_[row + (c ^ 1)] = no_path;
+            needs_[row + c] = 1;
         }
-        for (const Conditions& other : paths_) joined_.push_back(find(join(path, other)));
     }
+    // Without collisions where all pairs have a slot each; else a pair displaces another one.
+    join_mask_ = std::bit_ceil(std::min(paths_.size() * paths_.size(), joins_max)) - 1;
+    joins_ = std::make_unique<std::atomic<uint64_t>[]>(join_mask_ + 1);
     term_of_.assign(paths_.size() * group_count_, no_term);
     terms_of_.resize(group_count_);
     for (uint32_t p = 0; p < paths_.size(); ++p)
@@ -139,8 +141,22 @@ DoorPaths::DoorPaths(const Scene& scene, std::span<const DoorIndices> closed_tog
         for (uint32_t p = 0; p < paths_.size(); ++p) {
             if (kept[g].contains(paths_[p])) continue;
             const auto instead = nearestKept(paths_[p], kept[g]);
-            if (instead) term_of_[p * group_count_ + g] = term_of_[index.at(*instead) * group_count_ + g];
+            if (instead) term_of_[p * group_count_ + g] = term_of_[path_at_.at(*instead) * group_count_ + g];
         }
+}
+
+// Of conditions that do not contradict each other: the path, or what is kept instead.
+uint32_t DoorPaths::find(const Conditions& conditions) const {
+    const auto kept_path = nearestKept(conditions, path_at_);
+    return kept_path ? path_at_.at(*kept_path) : no_path;
+}
+
+uint32_t DoorPaths::join(uint32_t a, uint32_t b, std::atomic<uint64_t>& slot) const {
+    const auto all = cook::join(paths_[a], paths_[b]);
+    const uint32_t path = all ? find(*all) : no_path;
+    // Of so many paths that their numbers do not fit, joins are found anew each time.
+    if (paths_.size() < Join::none) slot.store(Join::key(a, b) | std::min(path, Join::none), std::memory_order_relaxed);
+    return path;
 }
 
 }  // namespace dimmer::cook

@@ -10,7 +10,10 @@
 #include <trace/ray_scene.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <utility>
@@ -58,8 +61,9 @@ enum class Leaf {
 // alone, one without keeps every group's. Light that needs more doors than are kept together goes to the term without
 // some that it needs closed: states with no door open, and with one, have it. (It stays when such a door opens: light
 // off three closed doors, or off two that do not see each other, is a little too much where the one left out is open.
-// Which one that is depends on what any combination names.) Immutable; look-ups in tables of paths^2 and paths * groups
-// numbers.
+// Which one that is depends on what any combination names.) Answers never change, and may be asked for by many threads.
+// Pairs of paths are joined when they are asked for, and remembered in a table of fixed size: of a hall with many doors
+// there are too many for all of them, and most never meet.
 class DoorPaths {
    public:
     // `closed_together`: see doorsInSight() (bake/door_pairs.h).
@@ -78,7 +82,7 @@ class DoorPaths {
     uint32_t numberInGroup(uint32_t term) const { return number_in_group_[term]; }
 
     // The path that needs `condition` too, or what is kept instead; no_path where there is none or the two contradict.
-    uint32_t with(uint32_t path, uint32_t condition) const { return with_[path * condition_count_ + condition]; }
+    uint32_t with(uint32_t path, uint32_t condition) const { return joined(path, single_[condition]); }
     bool needs(uint32_t path, uint32_t condition) const { return needs_[path * condition_count_ + condition] != 0; }
     // `own`: the condition under which the receiver itself is there (a leaf's), or no_condition.
     Leaf leaf(uint32_t path, uint32_t own, uint32_t condition) const {
@@ -104,7 +108,7 @@ class DoorPaths {
         uint32_t behind = path_of_[from];
         if (own != no_condition) behind = without_[behind * condition_count_ + own];
         if (behind == no_path) return no_term;
-        return term(group_of_[from], joined_[path * paths_.size() + behind]);
+        return term(group_of_[from], joined(path, behind));
     }
     // What light of term `from` at a receiver that is there under `own` becomes as it leaves.
     uint32_t leaving(uint32_t from, uint32_t own) const {
@@ -112,15 +116,38 @@ class DoorPaths {
     }
 
    private:
+    using Conditions = std::vector<uint32_t>;  // ascending
+
+    // A pair of paths and what they join to, in one number, so that threads that write one slot leave no mixture.
+    struct Join {
+        static constexpr uint32_t bits = 21, none = (1u << bits) - 1;
+        static uint64_t key(uint32_t a, uint32_t b) { return uint64_t{a} << 2 * bits | uint64_t{b} << bits; }
+    };
+    static constexpr size_t joins_max = size_t{1} << 20;  // slots: 8 MB
+
+    // The path that needs what both do, or what is kept instead; no_path where they contradict.
+    uint32_t joined(uint32_t a, uint32_t b) const {
+        if (a == free_path || b == free_path) return std::max(a, b);
+        const uint64_t key = Join::key(a, b);
+        std::atomic<uint64_t>& slot = joins_[(uint64_t{a} * paths_.size() + b) & join_mask_];
+        const uint64_t found = slot.load(std::memory_order_relaxed) ^ key;
+        if (found <= Join::none) return found == Join::none ? no_path : static_cast<uint32_t>(found);
+        return join(a, b, slot);
+    }
+    uint32_t join(uint32_t a, uint32_t b, std::atomic<uint64_t>& slot) const;
+    uint32_t find(const Conditions& conditions) const;
+
     uint32_t condition_count_ = 0, group_count_ = 1;
-    std::vector<std::vector<uint32_t>> paths_;       // conditions, ascending
-    std::vector<uint32_t> with_;                     // path, condition
-    std::vector<uint8_t> needs_;                     // path, condition
-    std::vector<uint32_t> without_;                  // path, condition: without it; no_path where it needs the opposite
-    std::vector<uint32_t> joined_;                   // path, path
-    std::vector<uint32_t> term_of_;                  // path, group
-    std::vector<uint32_t> path_of_, group_of_;       // per term
-    std::vector<uint32_t> only_door_, less_closed_;  // per term
+    std::vector<Conditions> paths_;
+    std::map<Conditions, uint32_t> path_at_;
+    std::vector<uint32_t> single_;   // per condition: the path that needs it alone
+    std::vector<uint8_t> needs_;     // path, condition
+    std::vector<uint32_t> without_;  // path, condition: without it; no_path where it needs the opposite
+    std::unique_ptr<std::atomic<uint64_t>[]> joins_;
+    uint64_t join_mask_ = 0;
+    std::vector<uint32_t> term_of_;                   // path, group
+    std::vector<uint32_t> path_of_, group_of_;        // per term
+    std::vector<uint32_t> only_door_, less_closed_;   // per term
     std::vector<std::vector<uint32_t>> more_closed_;  // per term
     std::vector<Term> terms_;
     std::vector<uint32_t> number_in_group_;        // per term

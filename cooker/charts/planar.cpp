@@ -1,5 +1,6 @@
 #include <charts/planar.h>
 
+#include <charts/box_tree.h>
 #include <charts/raster.h>
 
 #include <algorithm>
@@ -86,6 +87,9 @@ class PlaneGrouper {
             for (size_t i = 0; i < 3; ++i) flat[i] = axes_.on(all_[id].corners_m[i]);
             flat_.push_back(flat);
         }
+        std::vector<BoxTree::Box> boxes;
+        for (uint32_t i = 0; i < ids_.size(); ++i) boxes.push_back(boxOf(i, 0));
+        boxes_ = BoxTree(std::move(boxes));
         findContacts();
     }
 
@@ -152,19 +156,22 @@ class PlaneGrouper {
         parent_.resize(ids_.size());
         std::iota(parent_.begin(), parent_.end(), 0u);
         rects_.resize(ids_.size());
-        members_.assign(ids_.size(), {});
-        for (uint32_t i = 0; i < ids_.size(); ++i) {
-            rects_[i] = rectOf(i);
-            members_[i] = {i};
-        }
+        for (uint32_t i = 0; i < ids_.size(); ++i) rects_[i] = rectOf(i);
+        // Of charts, by their roots: the lesser list goes into the longer one, so that few are moved often.
+        std::vector<std::set<uint32_t>> apart_from(ids_.size());
+        for (const auto& [a, b] : apart) apart_from[a].insert(b);
         for (const Contact& c : contacts_) {
             uint32_t a = find(c.a), b = find(c.b);
-            if (a == b || !fitsTogether(a, b) || areApart(a, b, apart)) continue;
-            if (members_[a].size() < members_[b].size()) std::swap(a, b);
+            if (a == b || !fitsTogether(a, b) || apart_from[a].contains(b)) continue;
+            if (apart_from[a].size() < apart_from[b].size()) std::swap(a, b);
             parent_[b] = a;
             rects_[a].add(rects_[b]);
-            members_[a].insert(members_[a].end(), members_[b].begin(), members_[b].end());
-            members_[b].clear();
+            for (const uint32_t other : apart_from[b]) {
+                apart_from[other].erase(b);
+                apart_from[other].insert(a);
+                apart_from[a].insert(other);
+            }
+            apart_from[b].clear();
         }
     }
 
@@ -177,27 +184,16 @@ class PlaneGrouper {
                waste_max * (rects_[a].area() + rects_[b].area()) + waste_free_texels / (density_ * density_);
     }
 
-    bool areApart(uint32_t a, uint32_t b, const Apart& apart) {
-        if (members_[a].size() > members_[b].size()) std::swap(a, b);
-        for (uint32_t i : members_[a])
-            for (auto it = apart.lower_bound({i, 0}); it != apart.end() && it->first == i; ++it)
-                if (find(it->second) == b) return true;
-        return false;
-    }
-
     // Pairs of faces of which one lies over the other, as a rug on a floor does. In one chart they would have the same
     // texels, and what hides the lower one would make them black.
     Apart findStacks() const {
         std::vector<Rect> rects(ids_.size());
-        std::vector<uint32_t> order(ids_.size());
         for (uint32_t i = 0; i < ids_.size(); ++i) rects[i] = rectOf(i);
-        std::iota(order.begin(), order.end(), 0u);
-        std::ranges::sort(order, {}, [&](uint32_t i) { return std::pair(rects[i].min.x, i); });
+        const auto place = [&](uint32_t i) { return std::pair(rects[i].min.x, i); };
         Apart stacks;
-        for (size_t i = 0; i < order.size(); ++i)
-            for (size_t j = i + 1; j < order.size(); ++j) {
-                const uint32_t a = order[i], b = order[j];
-                if (rects[b].min.x >= rects[a].max.x) break;
+        for (uint32_t a = 0; a < ids_.size(); ++a)
+            for (const uint32_t b : boxes_.touching(boxOf(a, 0))) {
+                if (place(b) <= place(a) || rects[b].min.x >= rects[a].max.x) continue;
                 if (rects[a].min.y >= rects[b].max.y || rects[b].min.y >= rects[a].max.y) continue;
                 if (liesOff(a, b) && liesOff(b, a) && !edgeParts(a, b) && !edgeParts(b, a)) keepApart(stacks, a, b);
             }
@@ -226,16 +222,21 @@ class PlaneGrouper {
     }
 
     // Adds the pairs of faces of one chart that come within the filter's reach of one another with a wall between.
-    bool findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked, Apart& apart) const {
+    bool findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked, Apart& apart) {
         const size_t before = apart.size();
         const float reach = filter_reach_texels / density_;
-        for (const auto& members : members_)
-            for (size_t a = 0; a < members.size(); ++a)
-                for (size_t b = a + 1; b < members.size(); ++b)
-                    if (near(members[a], members[b], reach) && (wallBetween(members[a], members[b], reach, blocked) ||
-                                                                wallBetween(members[b], members[a], reach, blocked)))
-                        keepApart(apart, members[a], members[b]);
+        for (uint32_t a = 0; a < ids_.size(); ++a)
+            for (const uint32_t b : boxes_.touching(boxOf(a, reach + touching_m)))
+                if (a < b && find(a) == find(b) && near(a, b, reach) &&
+                    (wallBetween(a, b, reach, blocked) || wallBetween(b, a, reach, blocked)))
+                    keepApart(apart, a, b);
         return apart.size() > before;
+    }
+
+    // In the plane, and so much more to each side.
+    BoxTree::Box boxOf(uint32_t face, float more_m) const {
+        const Rect rect = rectOf(face);
+        return {{rect.min - more_m, 0}, {rect.max + more_m, 0}};
     }
 
     Rect rectOf(uint32_t face) const {
@@ -291,10 +292,10 @@ class PlaneGrouper {
     Axes axes_;
     float density_, side_max_;
     std::vector<std::array<glm::vec2, 3>> flat_;
+    BoxTree boxes_;  // of the faces, in the plane
     std::vector<Contact> contacts_;
     std::vector<uint32_t> parent_;
     std::vector<Rect> rects_;
-    std::vector<std::vector<uint32_t>> members_;
 };
 
 }  // namespace

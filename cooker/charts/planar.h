@@ -33,7 +33,7 @@ inline uint32_t chartGroup(const SceneMesh& mesh) {
 }
 
 // `blocked(a, b)`: something opaque stands on the straight line between two points.
-// Deterministic; O(n log n) but for charts of very many faces.
+// Deterministic; near O(n log n) where the boxes of faces in one plane overlap few others.
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
                                       const std::function<bool(glm::vec3, glm::vec3)>& blocked);
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 namespace dimmer::cook {
@@ -36,16 +37,40 @@ inline CellRange cellRange(const std::array<glm::vec2, 3>& t, glm::uvec2 size) {
             std::min(cell(high.y, size.y) + 1, size.y)};
 }
 
+// visit(x, y) for the cells that a triangle may overlap, row by row: of each row those between its edges there, and a
+// little more than rounding can misplace them. A needle across a page crosses few of the cells of its box.
+template <class Visit>
+void forEachCellNear(const std::array<glm::vec2, 3>& t, glm::uvec2 size, Visit&& visit) {
+    constexpr double more = 0.125;  // cells; single precision is off by a hundredth at 16,384
+    const CellRange r = cellRange(t, size);
+    for (uint32_t y = r.y0; y < r.y1; ++y) {
+        const double bottom = y - more, top = y + 1 + more;
+        double low = 1e30, high = -1e30;
+        for (size_t i = 0; i < 3; ++i) {
+            glm::dvec2 a(t[i]), b(t[(i + 1) % 3]);
+            if (a.y > b.y) std::swap(a, b);
+            if (b.y < bottom || a.y > top) continue;
+            const auto at = [&](double v) { return a.y < b.y ? a.x + (b.x - a.x) * ((v - a.y) / (b.y - a.y)) : a.x; };
+            const double from = at(std::max(a.y, bottom)), to = a.y < b.y ? at(std::min(b.y, top)) : b.x;
+            low = std::min({low, from, to}), high = std::max({high, from, to});
+        }
+        if (low > high) continue;
+        const auto cell = [&](double v) {
+            return static_cast<uint32_t>(std::clamp(v, static_cast<double>(r.x0), static_cast<double>(r.x1)));
+        };
+        const uint32_t first = cell(std::floor(low - more)), end = cell(std::floor(high + more) + 1);
+        for (uint32_t x = first; x < end; ++x) visit(x, y);
+    }
+}
+
 // Cells whose centre is strictly inside.
 template <class Visit>
 void forEachCoveredCentre(const std::array<glm::vec2, 3>& t, glm::uvec2 size, Visit&& visit) {
-    const CellRange r = cellRange(t, size);
     constexpr float inside = 1e-4f;  // shared edges belong to neither
-    for (uint32_t y = r.y0; y < r.y1; ++y)
-        for (uint32_t x = r.x0; x < r.x1; ++x) {
-            const auto b = barycentric(t, glm::vec2(x, y) + 0.5f);
-            if (b && b->x > inside && b->y > inside && b->x + b->y < 1 - inside) visit(x, y);
-        }
+    forEachCellNear(t, size, [&](uint32_t x, uint32_t y) {
+        const auto b = barycentric(t, glm::vec2(x, y) + 0.5f);
+        if (b && b->x > inside && b->y > inside && b->x + b->y < 1 - inside) visit(x, y);
+    });
 }
 
 // The part of a triangle inside the unit square at (x, y); empty when they do not overlap.

@@ -32,12 +32,11 @@ std::vector<Covered> coverConservatively(const Unwrap& unwrap) {
     std::vector<std::vector<Covered>> parts(unwrap.faces.size());
     tbb::parallel_for(size_t{0}, unwrap.faces.size(), [&](size_t face) {
         const auto& uv = unwrap.uv_texels[face];
-        const CellRange r = cellRange(uv, {unwrap.page_width, unwrap.page_height});
         const uint64_t page = uint64_t{unwrap.charts[unwrap.face_chart[face]].page} * unwrap.page_height;
-        for (uint32_t y = r.y0; y < r.y1; ++y)
-            for (uint32_t x = r.x0; x < r.x1; ++x)
-                if (polygonArea(clipToCell(uv, x, y)) > 1e-6f)
-                    parts[face].push_back({(page + y) * unwrap.page_width + x, static_cast<uint32_t>(face)});
+        forEachCellNear(uv, {unwrap.page_width, unwrap.page_height}, [&](uint32_t x, uint32_t y) {
+            if (polygonArea(clipToCell(uv, x, y)) > 1e-6f)
+                parts[face].push_back({(page + y) * unwrap.page_width + x, static_cast<uint32_t>(face)});
+        });
     });
     std::vector<Covered> all;
     for (auto& part : parts) all.insert(all.end(), part.begin(), part.end());

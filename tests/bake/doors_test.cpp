@@ -114,6 +114,32 @@ TEST(DoorPaths, DoorsAreBakedEachWithTheOthersClosed) {
     EXPECT_EQ(paths.with(ab, c_open), no_path);
 }
 
+// A hall of doors that all see each other has paths for each pair: of pairs of these there are a billion.
+TEST(DoorPaths, OfAHallJoinOnlyWhatIsAskedFor) {
+    constexpr uint32_t doors = 256;
+    Scene scene;
+    scene.doors.resize(doors);
+    std::vector<DoorIndices> in_sight;
+    for (uint32_t a = 0; a < doors; ++a)
+        for (uint32_t b = a + 1; b < doors; ++b) in_sight.emplace_back(a, b);
+    const DoorPaths paths(scene, in_sight);
+    ASSERT_EQ(paths.pathCount(), 1 + 2 * doors + doors * (doors - 1) / 2);
+    const auto closed = [](uint32_t door) { return 2 * door; };
+    for (const uint32_t step : {1u, 2u, 255u})  // more pairs than are remembered, then again what they displaced
+        for (uint32_t a = 0; a < doors; a += step)
+            for (uint32_t b = a + 1; b < doors; b += step) {
+                const uint32_t from_a = paths.with(free_path, closed(a)), from_b = paths.with(free_path, closed(b));
+                const uint32_t both = paths.with(from_a, closed(b));
+                ASSERT_EQ(paths.terms()[paths.term(always_group, both)].doors_closed, (std::vector<uint32_t>{a, b}));
+                ASSERT_EQ(paths.with(from_b, closed(a)), both);
+                ASSERT_EQ(paths.with(both, closed(a) + 1), no_path);
+                const uint32_t light = paths.term(always_group, from_b);
+                ASSERT_EQ(paths.moved(light, both, no_condition), paths.term(always_group, both));
+                ASSERT_EQ(paths.moved(paths.term(always_group, both), from_a, closed(b)),
+                          paths.term(always_group, from_a));
+            }
+}
+
 // Leaves on the way to the wall, nearest first, through what the wall's glass lets pass; none behind it. Of more than
 // fit the nearest are kept, in whatever order a ray meets them.
 TEST(DoorRays, MeetTheLeavesBeforeTheWall) {

@@ -5,7 +5,7 @@
 namespace dimmer::cook::test {
 namespace {
 
-// The goal is 15 % for every set. The porch lamp, outdoors over open ground, misses it (33 %, docs/measurements.md): it
+// The goal is 15 % for every set. The porch lamp, outdoors over open ground, misses it (21 %, docs/measurements.md): it
 // is judged by a tenth more than that.
 constexpr std::string_view known_miss = "porch";
 
@@ -26,7 +26,7 @@ TEST(HouseSets, EachAddsWhatItShould) {
                scene->light_sets[s].name.c_str(), 100 * effect->error, 100 * effect->bias, effect->points,
                100 * effect->reference_noise);
         EXPECT_GE(effect->points, 30u) << scene->light_sets[s].name;
-        const double most = scene->light_sets[s].name == known_miss ? 0.36 : 0.15;
+        const double most = scene->light_sets[s].name == known_miss ? 0.23 : 0.15;
         // What is taken off in quadrature must stay small beside what is judged.
         EXPECT_LE(effect->reference_noise, most / 2) << scene->light_sets[s].name;
         EXPECT_LE(effect->error, most) << scene->light_sets[s].name;
