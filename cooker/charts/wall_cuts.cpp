@@ -18,7 +18,7 @@ constexpr float same_line_m = 2e-3f;
 constexpr float reach_texels = 2.5f;     // thinner than this leaks: bilinear filtering plus half a texel of averaging
 constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
 constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
-constexpr float margin_m = 5e-3f;        // a cut this close to a rectangle's edge parts nothing
+constexpr float margin_m = 5e-3f;  // a cut this close to a rectangle's edge parts nothing, nor one within its rounding
 constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
@@ -268,11 +268,13 @@ class WallCutter {
         glm::vec2 low(1e30f), high(-1e30f);
         for (const Piece& p : pieces)
             for (glm::vec2 c : p.corners) low = glm::min(low, c), high = glm::max(high, c);
+        const float largest = std::max({-low.x, -low.y, high.x, high.y});
+        const float margin = std::max(margin_m, rounding_share * largest);
         const Cut* best = nullptr;
         float best_length = 0;
         for (const Cut& c : cuts) {
             const int along = 1 - c.axis;
-            if (c.at < low[c.axis] + margin_m || c.at > high[c.axis] - margin_m) continue;
+            if (c.at < low[c.axis] + margin || c.at > high[c.axis] - margin) continue;
             const float length = wallLength(c, cuts, low[along], high[along]);
             const float needed = std::min(length_min_texels / texels_per_metre, 0.5f * (high[along] - low[along]));
             if (length < needed || length <= best_length) continue;

@@ -44,10 +44,10 @@ dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_
                                        dimmer_lights** lights) {
     if (!given(pack, lights)) return DIMMER_INVALID_ARGUMENT;
     constexpr uint32_t threads_max = 1024;
-    if (thread_count == 0 || thread_count > threads_max)
-        return report({ErrorCode::InvalidArgument,
-                       fmt::format("lights on the CPU run on 1 to {} threads, not {}", threads_max, thread_count)});
     return guarded([&] {
+        if (thread_count == 0 || thread_count > threads_max)
+            return report({ErrorCode::InvalidArgument,
+                           fmt::format("lights on the CPU run on 1 to {} threads, not {}", threads_max, thread_count)});
         *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count, moving_probes_max)};
         return DIMMER_OK;
     });

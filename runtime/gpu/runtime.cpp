@@ -448,6 +448,7 @@ Expected<void> Runtime::checkLoadable(LightSet set) const {
 
 Expected<void> Runtime::dropRecords(LightSet set) {
     DIMMER_TRY(checkLoadable(set));
+    if (impl_->records[set.element] == RecordsState::Dropped) return {};
     hold(set, true);
     // A state that is half written must go on without these records.
     for (uint32_t i = 0; i < impl_->pages.size(); ++i) planner(i).startOver();

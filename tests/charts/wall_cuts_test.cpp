@@ -179,5 +179,18 @@ TEST(WallCuts, EachOfManyRoomsHasItsFloorToItself) {
     }
 }
 
+// 200 km out floats are 1/64 m apart, more than the margin by which cuts keep off a rectangle's edge: a cut that
+// rounding put on the edge gave back the piece that it was made on, for ever.
+TEST(WallCuts, EndFarFromTheOrigin) {
+    Scene scene = twoRooms();
+    for (SceneMesh& mesh : scene.meshes)
+        for (glm::vec3& p : mesh.positions_m) p += glm::vec3(200000, 0, 200000);
+    cutAtWalls(scene, 4);
+    size_t triangles = 0;
+    for (const SceneMesh& mesh : scene.meshes) triangles += mesh.triangles.size();
+    EXPECT_GE(triangles, 60u);  // five boxes
+    EXPECT_LT(triangles, 1000u);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -428,6 +428,23 @@ TEST_F(AsyncTest, ARecordingThatNeverRunsBringsNothingBackThatWasDropped) {
         }
 }
 
+// As a game does that says every frame what it does not need: it began the state that was half written anew each time.
+TEST_F(AsyncTest, DroppingWhatIsDroppedBeginsNothingAnew) {
+    Runtime gpu = runtimeOf(packOf(test::randomPack(71)), {.buffering = Buffering::Double});
+    ASSERT_TRUE(gpu.dropRecords(LightSet{2}));
+    submitAll(gpu);
+    ASSERT_TRUE(gpu.setLimits({.receivers_max = 300}));
+    ASSERT_TRUE(gpu.apply("all=0.5"));
+    ASSERT_GT(gpu.submit()->receivers_waiting, 0u);
+    const uint32_t shown = gpu.pageSet();
+    for (int frame = 0; frame < 1000 && gpu.pageSet() == shown; ++frame) {
+        ASSERT_TRUE(gpu.dropRecords(LightSet{2}));
+        ASSERT_TRUE(gpu.setWeight(LightSet{1}, frame % 2 ? 0.25f : 0.75f));
+        ASSERT_TRUE(gpu.submit());
+    }
+    EXPECT_NE(gpu.pageSet(), shown);
+}
+
 TEST_F(AsyncTest, FiguresOfAnUpdateOutliveIdleOnes) {
     Runtime gpu = runtimeOf(packOf(test::randomPack(70)));
     const auto sent = gpu.submit();
