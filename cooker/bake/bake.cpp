@@ -5,6 +5,7 @@
 #include <bake/final_gather.h>
 #include <bake/group_light.h>
 #include <bake/series.h>
+#include <bake/sharpen.h>
 #include <models/scene_models.h>
 #include <probes/grid_bake.h>
 #include <probes/local_bake.h>
@@ -71,7 +72,8 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     return light;
 }
 
-// Direct light of fully baked lamps joins after the filter: it has no noise, and shadows have edges.
+// Direct light of fully baked lamps joins after the filters: it has no noise, and its shadows have edges, beside which
+// sharpening would leave bright and dark lines.
 Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sparse<ReceiverLight>& direct,
                                  const DoorPaths& paths) {
     return Sparse<ReceiverLight>::build(gathered.rows(), [&](size_t begin, size_t end, auto emit) {
@@ -118,6 +120,9 @@ FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
     FollowedLight followed{std::move(series.radiance), std::move(series.bounces)};
     series = {};
     if (settings.denoise) baked.light = denoise(gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
+    if (settings.sharpen)
+        baked.light =
+            sharpen({gatherer.rays(), gatherer.unwrap(), gatherer.texels()}, std::move(baked.light), progress);
     baked.light = withDirect(baked.light, direct, gatherer.paths());
     for (size_t i = 0; i < baked.light.rows(); ++i)
         for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;

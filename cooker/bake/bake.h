@@ -30,6 +30,7 @@ struct BakeSettings {
     uint32_t emitter_samples = 8;  // per series_rays or round of final rays, towards each light group's emitters
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
     bool denoise = false;          // filter what noise is left, in lightmap space
+    bool sharpen = false;          // texels as bilinear filtering needs them (bake/sharpen.h), not their means
     uint32_t bounces_max = 64;
     float tail_max = 0.002f;                   // stop when less of places' light is still to come, in the mean
     float threshold = 0.01f;                   // activity, as a share of a term's mean; see TermReport

@@ -23,8 +23,6 @@ constexpr float texel_deviations = 1.4f, mean_deviations = 0.5f;
 // little alone.
 constexpr int mean_reach = 1;
 
-// Directional light is averaged as it is stored, by the tangent frame.
-constexpr float same_frame_cos = 0.99f;
 // An unwrap of the level's own may stretch texels: longer than a square one of their area by so much.
 constexpr float stretch_max = 1.5f;
 // Off the plane, of the way to a neighbour: above what frames that agree curve, below a step of stairs.
@@ -41,7 +39,8 @@ class Surface {
         if (other == no_index || other == receiver) return other;
         const SamplePoint &a = texels_.sample(receiver, 0), &b = texels_.sample(other, 0);
         if (a.face == b.face || !unwrap_.charts[unwrap_.face_chart[a.face]].of_file) return other;
-        return framesAgree(a.face, b.face) && nearInSpace(a, b, dx, dy) ? other : no_index;
+        const bool alike = sameFrame(unwrap_.frames[a.face], unwrap_.frames[b.face]);
+        return alike && nearInSpace(a, b, dx, dy) ? other : no_index;
     }
 
     // visit(index in the receiver's row, entry) for the same terms of the texels around it. `counts`: how many each
@@ -54,30 +53,14 @@ class Surface {
             for (int dx = -mean_reach; dx <= mean_reach; ++dx) {
                 const uint32_t other = neighbour(receiver, dx, dy);
                 if (other == no_index || other == receiver) continue;
-                forEachCommon(here, light.row(other), [&](size_t i, const ReceiverLight& o) {
+                forEachCommonTerm(here, light.row(other), [&](size_t i, const ReceiverLight& o) {
                     visit(i, o);
                     counts[i] += 1;
                 });
             }
     }
 
-    // visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
-    static void forEachCommon(std::span<const ReceiverLight> here, std::span<const ReceiverLight> other, auto&& visit) {
-        size_t j = 0;
-        for (size_t i = 0; i < here.size(); ++i) {
-            while (j < other.size() && other[j].term < here[i].term) ++j;
-            if (j == other.size()) return;
-            if (other[j].term == here[i].term) visit(i, other[j]);
-        }
-    }
-
    private:
-    bool framesAgree(uint32_t a, uint32_t b) const {
-        const TangentFrame &f = unwrap_.frames[a], &g = unwrap_.frames[b];
-        return glm::dot(f.normal, g.normal) > same_frame_cos && glm::dot(f.tangent, g.tangent) > same_frame_cos &&
-               glm::dot(f.bitangent, g.bitangent) > same_frame_cos;
-    }
-
     // As near as texels of one plane are, wherever in them samples lie: islands lie side by side on the page alone, and
     // may lie in parallel planes. By whole texels' size: what a border cuts off leaves them as far apart.
     bool nearInSpace(const SamplePoint& a, const SamplePoint& b, int dx, int dy) const {
@@ -138,7 +121,7 @@ class LightmapFilter {
     void addRow(size_t receiver, size_t other, float spatial, std::vector<Sum>& sums) const {
         const auto here = light_.row(receiver), there = light_.row(other);
         const auto means_here = means_.row(receiver), means_there = means_.row(other);
-        Surface::forEachCommon(here, there, [&](size_t i, const ReceiverLight& o) {
+        forEachCommonTerm(here, there, [&](size_t i, const ReceiverLight& o) {
             float weight = spatial;
             if (other != receiver) {
                 const float texels = luminance(here[i].light.irradiance_lux) - luminance(o.light.irradiance_lux);

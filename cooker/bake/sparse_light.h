@@ -129,6 +129,17 @@ class Sparse {
 
 using SparseLight = Sparse<TermLight>;
 
+// visit(index in `here`, entry of `other`) for the terms that both hold; both ascend by term.
+template <class Entry>
+void forEachCommonTerm(std::span<const Entry> here, std::span<const Entry> other, auto&& visit) {
+    size_t j = 0;
+    for (size_t i = 0; i < here.size(); ++i) {
+        while (j < other.size() && other[j].term < here[i].term) ++j;
+        if (j == other.size()) return;
+        if (other[j].term == here[i].term) visit(i, other[j]);
+    }
+}
+
 // Whether light that comes from elsewhere is light of `rows` receivers and terms below `terms`.
 template <class Entry>
 bool fits(const Sparse<Entry>& light, size_t rows, size_t terms) {

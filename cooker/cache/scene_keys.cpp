@@ -158,6 +158,7 @@ Key bakeSettingsKey(const BakeSettings& s) {
         .add(s.emitter_samples)
         .add(s.noise_max)
         .add(uint32_t{s.denoise})
+        .add(uint32_t{s.sharpen})
         .add(s.bounces_max)
         .add(s.tail_max)
         .add(s.door_share)

@@ -244,6 +244,12 @@ TangentFrame tangentFrame(const std::array<glm::vec3, 3>& p, const std::array<gl
     return {tangent, glm::dot(bitangent, along_v) < 0 ? -bitangent : bitangent, normal};
 }
 
+bool sameFrame(const TangentFrame& a, const TangentFrame& b) {
+    constexpr float same_cos = 0.99f;
+    return glm::dot(a.normal, b.normal) > same_cos && glm::dot(a.tangent, b.tangent) > same_cos &&
+           glm::dot(a.bitangent, b.bitangent) > same_cos;
+}
+
 uint64_t pageTexels(std::span<const glm::uvec2> charts, uint32_t page_size) {
     Unwrap out;
     if (!packPages(charts, page_size, out)) return UINT64_MAX;

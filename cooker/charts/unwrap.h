@@ -32,6 +32,9 @@ struct TangentFrame {
     glm::vec3 tangent, bitangent, normal;
 };
 
+// Whether light from a direction is about the same in both: only then may directional light be mixed as it is stored.
+bool sameFrame(const TangentFrame& a, const TangentFrame& b);
+
 // The frame of a triangle from its corners' positions and lightmap UVs (in texels) and its unit normal; also the world
 // area of one texel.
 TangentFrame tangentFrame(const std::array<glm::vec3, 3>& positions_m, const std::array<glm::vec2, 3>& uv_texels,

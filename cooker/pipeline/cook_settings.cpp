@@ -22,6 +22,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .emitter_samples = quality.emitter_samples,
                           .noise_max = quality.noise,
                           .denoise = quality.denoise != 0,
+                          .sharpen = quality.sharpen != 0,
                           .bounces_max = quality.bounces,
                           .tail_max = quality.tolerance,
                           .threshold = profile.threshold,

@@ -5,6 +5,7 @@
 #include <bake/reference.h>
 #include <bake/sampling.h>
 #include <bake/series.h>
+#include <charts/bilinear.h>
 #include <encode/encode.h>
 #include <pipeline/charted_level.h>
 #include <pipeline/cook_settings.h>
@@ -21,8 +22,9 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t many_rays = 8192;   // per texel; twice as many at the point itself
-constexpr uint32_t tilted_count = 16;  // normals per point
+constexpr uint32_t point_rays = 16384;  // at a point itself
+constexpr uint32_t texel_rays = 4096;   // at each of the 16 texels or so that it shows
+constexpr uint32_t tilted_count = 16;   // normals per point
 constexpr uint32_t gather_seed = 0x5eed;
 // Points whose surface the charts know by another normal are no help.
 constexpr float same_normal_cos = 0.99f;
@@ -34,6 +36,7 @@ struct Rebake {
     std::optional<EmitterSampler> emitters;
     std::optional<DoorPaths> paths;
     std::optional<Gatherer> gatherer;
+    std::optional<BilinearTaps> taps;
     BakeSettings settings;
     Series series;
 };
@@ -51,20 +54,45 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     bake->emitters.emplace(*level.rays, meshGroups(level.scene));
     bake->paths.emplace(level.scene, doorsInSight(*level.rays));
     bake->gatherer.emplace(*level.rays, level.charts, bake->texels, *bake->emitters, *bake->paths);
+    bake->taps.emplace(*level.rays, level.charts, bake->texels);
     bake->settings = bakeSettings(settings->profile, quality, level.scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
 }
 
-// The texels that a bilinear filter mixes at a point.
+// What a pack shows at a point.
 struct Footprint {
-    struct Part {
-        uint32_t receiver;
-        float share;
-    };
-    std::vector<Part> parts;
+    std::vector<Tap> stored;    // of the stored texels, which a bilinear filter mixes
+    std::vector<Tap> gathered;  // of the light that was gathered at texels: what sharpening made the stored ones of
     std::optional<SamplePoint> centre;  // the point itself, with a face that lies in its surface
 };
+
+void addTap(std::vector<Tap>& taps, Tap tap) {
+    const auto known = std::ranges::find(taps, tap.receiver, &Tap::receiver);
+    if (known == taps.end())
+        taps.push_back(tap);
+    else
+        known->weight += tap.weight;
+}
+
+// Black texels have no share.
+void normalize(std::vector<Tap>& taps) {
+    float sum = 0;
+    for (const Tap& tap : taps) sum += tap.weight;
+    for (Tap& tap : taps) tap.weight /= sum;
+}
+
+// As sharpen() makes texels of gathered light, noise and what it holds back aside: twice a texel's own, less what is
+// shown around it.
+std::vector<Tap> sharpened(const BilinearTaps& taps, std::span<const Tap> stored) {
+    std::vector<Tap> out, around;
+    for (const auto& [receiver, share] : stored) {
+        addTap(out, {receiver, 2 * share});
+        taps.around(receiver, around);
+        for (const Tap& tap : around) addTap(out, {tap.receiver, -share * tap.weight});
+    }
+    return out;
+}
 
 Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p) {
     Footprint out;
@@ -72,16 +100,14 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
                           p.uv[1] * static_cast<float>(pack.pageHeight()) - 0.5f);
     const glm::ivec2 first(glm::floor(place)), last(pack.pageWidth() - 1, pack.pageHeight() - 1);
     const glm::vec2 along = place - glm::vec2(first);
-    const size_t page = pack.meshes()[p.mesh].page;
+    const uint32_t page = pack.meshes()[p.mesh].page;
     float nearest = INFINITY;
     for (int i = 0; i < 4; ++i) {
         const glm::ivec2 corner(i & 1, i >> 1), at = glm::clamp(first + corner, glm::ivec2(0), last);
         const float share = (corner.x ? along.x : 1 - along.x) * (corner.y ? along.y : 1 - along.y);
-        const uint32_t receiver =
-            bake.texels.receiver_at[(page * pack.pageHeight() + static_cast<size_t>(at.y)) * pack.pageWidth() +
-                                    static_cast<size_t>(at.x)];
+        const uint32_t receiver = bake.taps->shownAt(page, at);
         if (receiver == no_index || !(share > 0)) continue;
-        out.parts.push_back({receiver, share});
+        out.stored.push_back({receiver, share});
         for (uint32_t s = 0; s < bake.texels.sampleCount(receiver); ++s) {
             const SamplePoint& sample = bake.texels.sample(receiver, s);
             const float distance = glm::distance(sample.position_m, p.position_m);
@@ -91,6 +117,8 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
             out.centre = {{p.position_m + path_offset_m * p.frame.normal, sample.face}};
         }
     }
+    normalize(out.stored);
+    out.gathered = bake.settings.sharpen ? sharpened(*bake.taps, out.stored) : out.stored;
     return out;
 }
 
@@ -133,31 +161,30 @@ Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const 
     std::vector<ReceiverLight> row;
 
     const Footprint footprint = footprintOf(bake, pack, p);
-    if (footprint.parts.empty() || !footprint.centre) return {};
-    double at_texels = 0, where_active = 0, texel_variance = 0, shares = 0;
+    if (footprint.stored.empty() || !footprint.centre) return {};
+    double at_texels = 0, where_active = 0, texel_variance = 0;
     double direct = 0;  // stored direct light: no part of the gather, and the same in every step after the first
-    options.rays_max = many_rays;
-    for (const auto& [receiver, share] : footprint.parts) {
+    options.rays_max = texel_rays;
+    for (const auto& [receiver, share] : footprint.gathered) {
         row.clear();
         gather.gather(bake.gatherer->at(receiver), all, bake.series.radiance, options, row);
         bake.series.activeTerms(receiver, active);
         const auto weight = static_cast<double>(share);
-        shares += weight;
         for (const ReceiverLight& l : row) {
             const double lux = weight * mixed.lux(l.term, l.light);
             at_texels += lux;
             if (std::ranges::binary_search(active, l.term)) where_active += lux;
             texel_variance += weight * weight * mixed.variance(l);
         }
-        for (const ReceiverLight& d : bake.series.stored_direct.row(receiver))
-            direct += weight * mixed.lux(d.term, d.light);
     }
-    at_texels /= shares, where_active /= shares, direct /= shares, texel_variance /= shares * shares;
+    for (const auto& [receiver, share] : footprint.stored)
+        for (const ReceiverLight& d : bake.series.stored_direct.row(receiver))
+            direct += static_cast<double>(share) * mixed.lux(d.term, d.light);
     row.clear();
-    options.rays_max = 2 * many_rays;
+    options.rays_max = point_rays;
     const GatherFrom centre{{&*footprint.centre, 1},
-                            hash(gather_seed, footprint.parts[0].receiver),
-                            bake.gatherer->conditionOf(footprint.parts[0].receiver)};
+                            hash(gather_seed, footprint.stored[0].receiver),
+                            bake.gatherer->conditionOf(footprint.stored[0].receiver)};
     gather.gather(centre, all, bake.series.radiance, options, row);
     double at_point = 0, point_variance = 0;
     for (const ReceiverLight& l : row) {
@@ -229,8 +256,8 @@ std::optional<Hit> nearestClosed(const RayScene& rays, glm::vec3 origin, glm::ve
 void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std::span<const glm::vec3> normals,
                    TermAccumulator<Falloff>& sum) {
     const TangentFrame& frame = bake.level->charts.frames[from.face];
-    const float lux_per_radiance = pi / (2 * many_rays);
-    for (uint32_t i = 0; i < 2 * many_rays; ++i) {
+    const float lux_per_radiance = pi / point_rays;
+    for (uint32_t i = 0; i < point_rays; ++i) {
         const glm::vec3 d = cosineDirection(sequence2d(i, hash(id, gather_seed)));
         if (!(d.z > 1e-3f)) continue;
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;

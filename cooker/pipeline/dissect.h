@@ -14,9 +14,9 @@ namespace dimmer::cook {
 // The steps from the truth to what a pack shows, each against the one before it. Means of |difference| over
 // (E_ref + floor), with the noise of both sides taken off in quadrature.
 //   series_expansion    stored bounces, texel by texel, instead of paths; gathered at the point itself
-//   texel_size          gathered at the texels' points and filtered, instead of at the point
+//   texel_size          gathered at the texels' points, sharpened and filtered, instead of at the point
 //   activity_threshold  without the light sets that are not active there
-//   noise               the cook's own rays (and its filter) instead of many
+//   noise               the cook's own rays (its filter, and what sharpening holds back) instead of many
 // They need not add up to the whole error: they can cancel.
 using ErrorCauses = std::map<std::string, double>;
 
@@ -25,7 +25,7 @@ using ErrorCauses = std::map<std::string, double>;
 Expected<void> checkRebake(const Scene& scene, const Pack& pack);
 
 // Bakes the first passes of `scene` again, as the pack's settings say, and gathers at `points`. `pairs`: per point, the
-// pack's light and the reference in this state; doors are closed. Cost: the cook without its last pass, and some 50,000
+// pack's light and the reference in this state; doors are closed. Cost: the cook without its last pass, and some 80,000
 // rays per point.
 Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::span<const VerifyPoint> points,
                                   std::span<const LightPair> pairs, const ReferenceState& state, double floor_lux,

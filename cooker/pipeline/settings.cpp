@@ -151,6 +151,9 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
     list.push_back({prefix + "noise", &q.noise, 0, 1,
                     "rays end once the 95 % interval is within this share (0..1) of the light; 0: never early"});
     list.push_back({prefix + "denoise", &q.denoise, 0, 1, "1: filter the noise that is left; 0: keep every detail"});
+    list.push_back({prefix + "sharpen", &q.sharpen, 0, 1,
+                    "1: texels that bilinear filtering shows the gathered light of; 0: the light as it was gathered, "
+                    "which filtering blurs again"});
     list.push_back({prefix + "probe_sites", &q.probe_sites, 1, 256,
                     "places per probe of the global grid at which light is traced, to choose and fit probes by"});
     list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});
