@@ -12,8 +12,13 @@
 namespace dimmer::cook {
 namespace {
 
-// Shadow rays stop this short of the emitter they aim at, so as not to hit it.
-constexpr float shadow_end_share = 1 - 1e-4f;
+// Where shadow rays end, so as not to hit the emitter that they aim at: short of it by more than a hit is rounded, and
+// no more than a millimetre until that is far more than a kilometre's rounding, or thin covers would let its light
+// through.
+float shadowEnd(float distance_m) {
+    constexpr float share = 1e-4f, most_m = 1e-3f, rounding = 2e-6f;
+    return distance_m - std::max(std::min(share * distance_m, most_m), rounding * distance_m);
+}
 // Where rays end is known before the light there is asked for: so many rays ahead it begins to load.
 constexpr uint32_t rays_ahead = 8;
 
@@ -444,7 +449,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
             const float weight = Light::Intake::weight(d), by_area = samples * s.pdf;
             const uint32_t target = rays_.triangles()[s.triangle].condition;
             forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction,
-                       s.distance_m * shadow_end_share, [&](float passed, uint32_t way) {
+                       shadowEnd(s.distance_m), [&](float passed, uint32_t way) {
                            const uint32_t path = onto(way, from.condition, target);
                            const uint32_t term = wantedOf(range.group, path, sum);
                            const float by_hit =

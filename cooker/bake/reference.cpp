@@ -12,6 +12,11 @@
 namespace dimmer::cook {
 namespace {
 
+// Short of what a ray aims at by at most a millimetre, or a few roundings of a longer way.
+float justBefore(float distance_m) {
+    return distance_m - std::clamp(1e-4f * distance_m, 2e-6f * distance_m, std::max(1e-3f, 2e-6f * distance_m));
+}
+
 // Roulette ends paths; the limit is for nothing but a bound (0.99^4096, the largest reflectance's share, is 1e-18).
 constexpr int roulette_after = 3, vertices_max = 4096;
 // Shadow rays to lamps per vertex; with no more lamps than that, each gets its own.
@@ -236,7 +241,7 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     if (!(cos_here > 0) || !(cos_there > 0) || !(cos_lamp > 0)) return glm::vec3(0);
     const float geometry = cos_here * cos_there / distance2;
     return lit->reflectance / pi * lamps_[lamp].weight * there.irradiance_lux *
-           (cos_lamp * geometry * rays_.transmittance(vertex.point, direction, distance * (1 - 1e-4f)) /
+           (cos_lamp * geometry * rays_.transmittance(vertex.point, direction, justBefore(distance)) /
             (geometry / pi + lampPdf(vertex, lamp, *lit)));
 }
 
@@ -270,7 +275,7 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     // What is cut out or blended shines by its alpha, as a ray that hits it finds.
     const float shown = coverage(rays_, light.triangle, a, b);
     return light.radiance_cd_m2 *
-           (shown * cos_surface * rays_.transmittance(vertex.point, direction, distance * (1 - 1e-4f)) /
+           (shown * cos_surface * rays_.transmittance(vertex.point, direction, justBefore(distance)) /
             (by_area + by_hit));
 }
 

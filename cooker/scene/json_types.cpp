@@ -43,6 +43,16 @@ constexpr Rule of_view[] = {
 constexpr Rule of_material[] = {{"pbrMetallicRoughness", Kind::Object}, {"emissiveFactor", Kind::Numbers, 3},
                                 {"emissiveTexture", Kind::Object},      {"alphaMode", Kind::Text},
                                 {"alphaCutoff", Kind::Number},          {"doubleSided", Kind::Flag}};
+constexpr Rule of_material_extensions[] = {{"KHR_materials_emissive_strength", Kind::Object},
+                                           {"KHR_materials_specular", Kind::Object}};
+constexpr Rule of_emissive_strength[] = {{"emissiveStrength", Kind::Number}};
+constexpr Rule of_specular[] = {{"specularFactor", Kind::Number}};
+constexpr Rule of_light[] = {{"color", Kind::Numbers, 3},
+                             {"intensity", Kind::Number},
+                             {"range", Kind::Number},
+                             {"spot", Kind::Object},
+                             {"type", Kind::Text}};
+constexpr Rule of_spot[] = {{"innerConeAngle", Kind::Number}, {"outerConeAngle", Kind::Number}};
 constexpr Rule of_surface[] = {{"baseColorFactor", Kind::Numbers, 4},
                                {"baseColorTexture", Kind::Object},
                                {"metallicFactor", Kind::Number},
@@ -54,7 +64,7 @@ constexpr Rule of_texture_transform[] = {
 constexpr Rule of_texture[] = {{"source", Kind::Index}, {"sampler", Kind::Index}};
 constexpr Rule of_image[] = {{"bufferView", Kind::Index}, {"uri", Kind::Text}, {"mimeType", Kind::Text}};
 
-// Whose values the parser hands over as ints. (It reads KHR_lights_punctual's lights themselves as numbers.)
+// Whose values the parser hands over as ints.
 constexpr std::string_view read_extensions[] = {"EXT_lights_ies", "KHR_lights_punctual",
                                                 "KHR_materials_emissive_strength", "KHR_materials_specular",
                                                 "KHR_texture_transform"};
@@ -117,7 +127,8 @@ class TypeChecker {
         if (const auto ies = memberOf(memberOf(&root_, "extensions"), "EXT_lights_ies"))
             ints(*ies, "EXT_lights_ies", "the file");
         if (const auto punctual = memberOf(memberOf(&root_, "extensions"), "KHR_lights_punctual"))
-            forEach(*punctual, "lights", "light", {});
+            forEach(*punctual, "lights", "light", of_light,
+                    [&](const json& light, const std::string& owner) { inner(light, "spot", owner, of_spot); });
         forEach("scenes", "scene", of_scene);
         forEach("nodes", "node", of_node);
         forEach("accessors", "accessor", of_accessor, [&](const json& accessor, const std::string& owner) {
@@ -134,6 +145,11 @@ class TypeChecker {
         });
         forEach("materials", "material", of_material, [&](const json& material, const std::string& owner) {
             inner(material, "emissiveTexture", owner, of_texture_info);
+            if (const json* extensions = memberOf(&material, "extensions")) {
+                object(*extensions, owner, of_material_extensions);
+                inner(*extensions, "KHR_materials_emissive_strength", owner, of_emissive_strength);
+                inner(*extensions, "KHR_materials_specular", owner, of_specular);
+            }
             const auto surface = material.find("pbrMetallicRoughness");
             if (surface == material.end()) return;
             object(*surface, owner, of_surface);
@@ -181,10 +197,19 @@ class TypeChecker {
     void intsBeside(const json& item, const std::string& owner) {
         if (const json* extras = memberOf(&item, "extras"); extras && extras->is_object())
             for (const auto& [key, value] : extras->items())
-                if (key.starts_with("dimmer_")) ints(value, key, owner);
+                if (key.starts_with("dimmer_")) {
+                    stated(value, key, owner);
+                    ints(value, key, owner);
+                }
         if (const json* extensions = memberOf(&item, "extensions"); extensions && extensions->is_object())
             for (const auto& [key, value] : extensions->items())
                 if (std::ranges::count(read_extensions, key) > 0) ints(value, key, owner);
+    }
+    // The parser takes null, and objects without members, for what is not there: a lamp would no longer be of its set.
+    void stated(const json& value, const std::string& key, const std::string& owner) {
+        if ((value.is_null() || (value.is_object() && value.empty())) && problem_.empty())
+            problem_ =
+                fmt::format("{}: {}: '{}' is {}. Give it a value, or leave it out.", file_, owner, key, value.dump());
     }
     void ints(const json& value, const std::string& key, const std::string& owner) {
         if (value.is_object())

@@ -26,14 +26,11 @@ Expected<glm::vec3> intensity(const ImportContext& context, const tinygltf::Ligh
     return glm::vec3(product);
 }
 
-// The parser takes what is no number for a number that is not there, and a range of 0 for none.
-Expected<void> checkNumbers(const ImportContext& context, int light, const std::string& owner) {
+// The parser takes a range of 0 for none.
+Expected<void> checkRange(const ImportContext& context, int light, const std::string& owner) {
     const auto extension = context.model.extensions.find("KHR_lights_punctual");
     if (extension == context.model.extensions.end() || !extension->second.Has("lights")) return {};
     const tinygltf::Value& stated = extension->second.Get("lights").Get(static_cast<size_t>(light));
-    for (const char* key : {"intensity", "range"})
-        if (stated.Has(key) && !stated.Get(key).IsNumber())
-            return context.error(owner, fmt::format("its light's {} is not a number. Correct the light.", key));
     if (stated.Has("range") && stated.Get("range").GetNumberAsDouble() == 0)
         return context.error(owner, "its light's range is not greater than 0. Correct it or leave it out.");
     return {};
@@ -77,7 +74,7 @@ Expected<PunctualLight> importLight(const ImportContext& context, int light, int
     result.direction = forward(world_from_node);
     if (result.type == LightType::Spot)
         if (const auto ok = cone(context, source.spot, owner, result); !ok) return std::unexpected(ok.error());
-    if (const auto ok = checkNumbers(context, light, owner); !ok) return std::unexpected(ok.error());
+    if (const auto ok = checkRange(context, light, owner); !ok) return std::unexpected(ok.error());
     if (source.range != 0) {  // the parser's 0 is "no range"
         if (!isFiniteFloat(source.range) || !(static_cast<float>(source.range) > 0))
             return context.error(owner, "its light's range is not greater than 0. Correct it or leave it out.");

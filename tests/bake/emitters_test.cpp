@@ -1,5 +1,6 @@
 // Emissive surfaces as lights of the baker, against form factors.
 #include <bake/baked_scene.h>
+#include <bake/reference.h>
 #include <bake/test_scenes.h>
 
 namespace dimmer::cook::test {
@@ -112,6 +113,39 @@ TEST(BakeEmitters, ASmallThingFarAwayIsNotLeftToChance) {
         return 1e6 * 4 * half * half * std::pow(height, 2) / std::pow(d, 4);
     });
     EXPECT_LT(each, 0.001);  // seen as a point: the square of its size over its distance, 1e-6
+}
+
+// 3 mm before a panel, 54 m off: shadow rays that ended a share of the way before it passed the cover. The small panel
+// beside it, of the same group, is what makes them ask for the group there: 1000 cd/m2 x 0.01 m2 / (54 m)^2 = 0.0034
+// lux.
+TEST(Emitters, ThinCoversFarAwayHideThem) {
+    constexpr float away_m = 54;
+    for (const bool covered : {true, false}) {
+        Scene scene;
+        const uint32_t black = addMaterial(scene, lambert(0));
+        addQuad(scene, "wall", {0, 0, 0}, {0.5f, 0, 0}, {0, 0.5f, 0}, black);
+        addQuad(scene, "panel", {0, 0, away_m}, {0, 0.5f, 0}, {0.5f, 0, 0},
+                addMaterial(scene, emissive(glm::vec3(1e5f))));
+        addQuad(scene, "small", {2, 0, away_m}, {0, 0.05f, 0}, {0.05f, 0, 0},
+                addMaterial(scene, emissive(glm::vec3(1e3f))));
+        if (covered) addQuad(scene, "cover", {0, 0, away_m - 0.003f}, {0, 0.6f, 0}, {0.6f, 0, 0}, black);
+        BakedScene b(scene);
+        b.bake({.final_rays = 256, .emitter_samples = 4});
+        const ReferenceTracer tracer(*b.rays, {});
+        const double open_lux = 1e5 / (double{away_m} * away_m);
+        for (size_t i = 0; i < b.texels.size(); ++i) {
+            if (b.meshOf(i) != "wall") continue;
+            const double baked = static_cast<double>(b.lux(i).y);
+            const double traced =
+                static_cast<double>(tracer.irradiance({b.place(i), b.normal(i)}, 4096).irradiance_lux.y);
+            // Covered: the small panel's, of which few rays find much each. Open: 5 % for a wall's and a panel's width.
+            for (const double lux : {baked, traced})
+                if (covered)
+                    EXPECT_LT(lux, 0.1);
+                else
+                    EXPECT_NEAR(lux, open_lux, 0.05 * open_lux);
+        }
+    }
 }
 
 }  // namespace

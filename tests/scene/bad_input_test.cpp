@@ -185,6 +185,32 @@ TEST(SceneBadInput, ValuesOfTheWrongTypeNameTheirPlace) {
     }
 }
 
+// The parser has no value for them: a switchable lamp would always be on, a glowing material dark.
+TEST(SceneBadInput, ValuesThatSayNothingAreRefused) {
+    const Fault faults[] = {
+        {"set",
+         [](json& d) { d["nodes"][3]["extras"]["dimmer_light_set"] = nullptr; },
+         {"node 'lamp'", "dimmer_light_set"}},
+        {"lighting",
+         [](json& d) { d["nodes"][0]["extras"]["dimmer_lighting"] = json::object(); },
+         {"node 'floor'", "dimmer_lighting"}},
+        {"extension",
+         [](json& d) { d["materials"][1]["extensions"]["KHR_materials_emissive_strength"] = 5; },
+         {"material 'glow'", "KHR_materials_emissive_strength"}},
+        {"strength",
+         [](json& d) {
+             d["materials"][1]["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = nullptr;
+         },
+         {"material 'glow'", "emissiveStrength"}},
+    };
+    for (const Fault& fault : faults) {
+        LevelFile level = fullLevel();
+        fault.apply(level.document);
+        SCOPED_TRACE(fault.name);
+        expectBadInput(level.import(), fault.message);
+    }
+}
+
 // The parser cuts whole numbers of extras and extensions to 32 bits: 2^32 + 2 candela would be 2.
 TEST(SceneBadInput, WholeNumbersThatDoNotFitAreRefused) {
     const Fault faults[] = {
