@@ -109,7 +109,10 @@ const Limit* exceeded(const LossTable& losses, const std::vector<Limit>& limits,
     return it == limits.end() ? nullptr : &*it;
 }
 
+constexpr const char* threshold_key = "records.threshold";
+
 float thresholdOf(const PackData& pack, const Profile& profile, uint32_t group) {
+    if (group == always_group) return profile.threshold;
     const auto own = profile.set_thresholds.find(pack.elements[group - 1].name);
     return own == profile.set_thresholds.end() ? profile.threshold : own->second;
 }
@@ -123,12 +126,19 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
     remedy.energy = loss.energy;
     remedy.fits =
         exceeded(losses, limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
-    for (uint32_t g = 1; g < rungs.size(); ++g) {
-        if (rungs[g] == 0) continue;
-        const float from = thresholdOf(pack, profile, g);
-        if (!(from > 0 && from < threshold_max)) continue;  // what is stored whole has no multiples
-        remedy.changes.push_back({std::string(set_threshold_prefix) + pack.elements[g - 1].name, from,
-                                  std::min(threshold_max, threshold_rungs[rungs[g]] * from)});
+    const auto raised = [&](uint32_t group) {
+        const float from = thresholdOf(pack, profile, group);
+        if (!(from > 0 && from < threshold_max)) return from;  // what is stored whole has no multiples
+        return std::min(threshold_max, threshold_rungs[rungs[group]] * from);
+    };
+    // Always-on light goes by the threshold of all, which sets without one of their own go by too.
+    const float of_all = rungs.empty() ? profile.threshold : raised(always_group);
+    if (of_all != profile.threshold) remedy.changes.push_back({threshold_key, profile.threshold, of_all});
+    for (uint32_t g = always_group + 1; g < rungs.size(); ++g) {
+        const std::string& name = pack.elements[g - 1].name;
+        const float from = thresholdOf(pack, profile, g), to = raised(g);
+        if (to != (profile.set_thresholds.contains(name) ? from : of_all))
+            remedy.changes.push_back({std::string(set_threshold_prefix) + name, from, to});
     }
     return remedy;
 }
@@ -141,7 +151,7 @@ Rungs greedy(const LossTable& losses, const std::vector<Limit>& limits) {
         uint32_t best_group = 0;
         uint8_t best_rung = 0;
         double best = INFINITY;
-        for (uint32_t g = 1; g < rungs.size(); ++g)
+        for (uint32_t g = 0; g < rungs.size(); ++g)
             for (auto r = static_cast<uint8_t>(rungs[g] + 1); r < threshold_rungs.size(); ++r) {
                 const uint64_t saved = limit->saved_by(steps, g, rungs[g], r);
                 const double price =
@@ -162,7 +172,7 @@ Rungs greedy(const LossTable& losses, const std::vector<Limit>& limits) {
 Rungs firstFitting(const LossTable& losses, const std::vector<Limit>& limits, uint32_t group) {
     Rungs rungs(losses.groupCount(), 0);
     for (uint8_t r = 1; r < threshold_rungs.size(); ++r) {
-        for (uint32_t g = 1; g < rungs.size(); ++g)
+        for (uint32_t g = 0; g < rungs.size(); ++g)
             if (group == no_index || g == group) rungs[g] = r;
         if (!exceeded(losses, limits, rungs)) break;
     }

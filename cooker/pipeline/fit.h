@@ -35,9 +35,10 @@ struct Remedy {
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 
-// What `cook --fit` does: thresholds of the sets that lose least for the bytes, or density where thresholds do not do;
-// and of probes where the total is too much; further than predicted where so many steps of density fell short.
-// Empty where all of that together, texels no more than 16 times as long as they are now, is predicted not to do.
+// What `cook --fit` does: thresholds of the light groups (of always-on light by that of all) that lose least for the
+// bytes, or density where thresholds do not do; and of probes where the total is too much; further than predicted where
+// so many steps of density fell short. Empty where all of that together, texels no more than 16 times as long as they
+// are now, is predicted not to do.
 Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                      size_t density_steps = 0);
 
