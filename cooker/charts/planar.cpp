@@ -3,6 +3,8 @@
 #include <charts/box_tree.h>
 #include <charts/raster.h>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -96,7 +98,7 @@ class PlaneGrouper {
     std::vector<PlanarChart> charts(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
         Apart apart = findStacks();
         merge(apart);
-        if (findWalls(blocked, apart)) merge(apart);
+        if (blocked && findWalls(blocked, apart)) merge(apart);
         std::map<uint32_t, PlanarChart> by_root;
         for (uint32_t i = 0; i < ids_.size(); ++i) {
             const uint32_t root = find(i);
@@ -225,11 +227,17 @@ class PlaneGrouper {
     bool findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked, Apart& apart) {
         const size_t before = apart.size();
         const float reach = filter_reach_texels / density_;
-        for (uint32_t a = 0; a < ids_.size(); ++a)
+        std::vector<uint32_t> root(ids_.size());
+        for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = find(i);
+        std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
+        tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
             for (const uint32_t b : boxes_.touching(boxOf(a, reach + touching_m)))
-                if (a < b && find(a) == find(b) && near(a, b, reach) &&
+                if (a < b && root[a] == root[b] && near(a, b, reach) &&
                     (wallBetween(a, b, reach, blocked) || wallBetween(b, a, reach, blocked)))
-                    keepApart(apart, a, b);
+                    beyond_walls[a].push_back(b);
+        });
+        for (uint32_t a = 0; a < ids_.size(); ++a)
+            for (const uint32_t b : beyond_walls[a]) keepApart(apart, a, b);
         return apart.size() > before;
     }
 

@@ -32,8 +32,9 @@ inline uint32_t chartGroup(const SceneMesh& mesh) {
     return mesh.door ? 2 * *mesh.door + mesh.is_open_leaf + 1 : 0;
 }
 
-// `blocked(a, b)`: something opaque stands on the straight line between two points.
-// Deterministic; near O(n log n) where the boxes of faces in one plane overlap few others.
+// `blocked(a, b)`: something opaque stands on the straight line between two points; asked on all threads. Empty:
+// nothing does. Deterministic. Cost: with the number of faces times those within two texels of one, for which walls are
+// looked for between them; without `blocked`, near O(n log n) where the boxes of faces in one plane overlap few others.
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
                                       const std::function<bool(glm::vec3, glm::vec3)>& blocked);
 

@@ -84,8 +84,7 @@ class WallCutter {
 
     void run() {
         constexpr uint32_t no_side_limit = 1u << 20;
-        const auto charts =
-            planarCharts(std::span(faces_).first(cuttable_), no_side_limit, [](glm::vec3, glm::vec3) { return false; });
+        const auto charts = planarCharts(std::span(faces_).first(cuttable_), no_side_limit, {});
         std::vector<std::vector<std::vector<Piece>>> parts(charts.size());
         tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
         uint32_t region = 0;
