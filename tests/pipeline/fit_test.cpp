@@ -126,7 +126,7 @@ INSTANTIATE_TEST_SUITE_P(FromTheThresholdsOf, FitTheHouse,
                                          HouseSettings{"0.01", "2", 0.9}));
 
 // Half of what the living room's door holds is sun and sky, which no set's own threshold governs: sets alone could not
-// bring it within this, so that pages of a quarter of a texel per metre did.
+// bring it within this, so that the density was lowered.
 TEST_F(Fit, ADoorThatHoldsAlwaysOnLightKeepsTheDensity) {
     level = std::filesystem::path(DIMMER_SOURCE_DIR) / "game_sample/levels/house.gltf";
     const auto fitted = run(R"("budgets": {"per_element": 200000}, )", true);
