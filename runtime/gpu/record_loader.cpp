@@ -3,6 +3,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <limits>
 
 namespace dimmer {
@@ -21,24 +22,26 @@ RecordLoader::~RecordLoader() {
     vkWaitForFences(vulkan_.device, 1, &fence, VK_TRUE, std::numeric_limits<uint64_t>::max());
 }
 
-void RecordLoader::add(uint32_t contribution, const RecordStore& store) {
+void RecordLoader::add(uint32_t light_set, std::span<const uint32_t> contributions, const RecordStore& store) {
     if (!busy()) done_ = total_ = 0;
-    if (store.byteCount(contribution) == 0) return;
-    total_ += store.byteCount(contribution);
-    waiting_.push_back({contribution, 0});
-    if (is_waiting_.size() <= contribution) is_waiting_.resize(contribution + 1);
-    is_waiting_[contribution] = true;
+    if (left_.size() <= light_set) left_.resize(light_set + 1);
+    for (const uint32_t contribution : contributions) {
+        if (store.byteCount(contribution) == 0) continue;
+        total_ += store.byteCount(contribution);
+        ++left_[light_set];
+        pieces_.add(light_set, contribution, store);
+    }
 }
 
-void RecordLoader::cancel(uint32_t contribution) {
-    if (contribution >= is_waiting_.size() || !is_waiting_[contribution]) return;
-    is_waiting_[contribution] = false;
-    std::erase_if(waiting_, [&](const Load& load) { return load.contribution == contribution; });
+void RecordLoader::cancel(uint32_t light_set, const RecordStore& store) {
+    if (!pending(light_set)) return;
+    total_ -= pieces_.remove(light_set, store);
+    // Contributions that end with the piece under way are counted when it has arrived.
+    left_[light_set] = static_cast<uint32_t>(std::ranges::count(ends_, light_set));
 }
 
-bool RecordLoader::pending(uint32_t contribution) const {
-    return (in_flight_ && piece_of_ == contribution) ||
-           (contribution < is_waiting_.size() && is_waiting_[contribution]);
+bool RecordLoader::pending(uint32_t light_set) const {
+    return light_set < left_.size() && left_[light_set] > 0;
 }
 
 Expected<void> RecordLoader::create() {
@@ -64,6 +67,8 @@ Expected<bool> RecordLoader::finished() {
     DIMMER_VK(vkResetFences, vulkan_.device, 1, &fence);
     in_flight_ = false;
     done_ += std::exchange(piece_, 0);
+    for (const uint32_t light_set : ends_) --left_[light_set];
+    ends_.clear();
     return true;
 }
 
@@ -78,36 +83,28 @@ Expected<void> RecordLoader::step(const RecordStore& store, uint64_t bytes_max) 
     const auto free = finished();
     if (!free) return std::unexpected(free.error());
     if (!*free) return {};
-    if (waiting_.empty()) {
+    if (pieces_.empty()) {
         rest();
         return {};
     }
     if (!staging_.buffer) DIMMER_TRY(create());
-    Load& load = waiting_.front();
-    const uint64_t left = store.byteCount(load.contribution) - load.next_byte;
     // In pairs of records, as the store lays them out.
-    const uint64_t bytes = std::min({left, staging_bytes, std::max<uint64_t>(bytes_max / 16 * 16, 16)});
-    DIMMER_TRY(send(store, load, bytes));
-    load.next_byte += bytes;
-    piece_of_ = load.contribution;
-    piece_ = bytes;
-    if (bytes < left) return {};
-    is_waiting_[load.contribution] = false;
-    waiting_.pop_front();
+    const uint64_t room = std::min(staging_bytes, std::max<uint64_t>(bytes_max / 16 * 16, 16));
+    piece_ = pieces_.fill(store, std::span(staging_.mapped, room), regions_);
+    DIMMER_TRY(send(store));
+    pieces_.advance(store, piece_, ends_);
     return {};
 }
 
-Expected<void> RecordLoader::send(const RecordStore& store, Load& load, uint64_t bytes) {
-    store.fill(load.contribution, load.next_byte, std::span(staging_.mapped, bytes));
+Expected<void> RecordLoader::send(const RecordStore& store) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
     DIMMER_VK(vkBeginCommandBuffer, commands_.commands, &begin);
     constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
                                    copy = VK_PIPELINE_STAGE_TRANSFER_BIT;
     memoryBarrier(commands_.commands, compute | copy, VK_ACCESS_TRANSFER_WRITE_BIT, copy, VK_ACCESS_TRANSFER_WRITE_BIT);
-    const VkBufferCopy region{
-        .srcOffset = 0, .dstOffset = store.firstByte(load.contribution) + load.next_byte, .size = bytes};
-    vkCmdCopyBuffer(commands_.commands, staging_.buffer.get(), store.buffer(), 1, &region);
+    vkCmdCopyBuffer(commands_.commands, staging_.buffer.get(), store.buffer(), static_cast<uint32_t>(regions_.size()),
+                    regions_.data());
     memoryBarrier(commands_.commands, copy, VK_ACCESS_TRANSFER_WRITE_BIT, compute, VK_ACCESS_SHADER_READ_BIT);
     DIMMER_VK(vkEndCommandBuffer, commands_.commands);
     auto submit = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);

@@ -1,9 +1,7 @@
 // Brings records to the device beside the game: a piece at a time, never waiting for the device.
 #pragma once
 
-#include <gpu/record_store.h>
-
-#include <deque>
+#include <gpu/record_queue.h>
 
 namespace dimmer {
 
@@ -15,25 +13,21 @@ class RecordLoader {
     RecordLoader(const RecordLoader&) = delete;
     RecordLoader& operator=(const RecordLoader&) = delete;
 
-    // The store has reserved the contribution's range.
-    void add(uint32_t contribution, const RecordStore& store);
-    // Forgets a contribution that is still to come; one in the middle of it included.
-    void cancel(uint32_t contribution);
+    // The store has reserved the contributions' ranges.
+    void add(uint32_t light_set, std::span<const uint32_t> contributions, const RecordStore& store);
+    // Forgets what is still to come of a light set.
+    void cancel(uint32_t light_set, const RecordStore& store);
     // Sends the next piece, of at most so many bytes, unless the last one is still under way. Returns at once.
     Expected<void> step(const RecordStore& store, uint64_t bytes_max);
-    bool pending(uint32_t contribution) const;  // constant time
-    bool busy() const { return !waiting_.empty() || in_flight_; }
+    bool pending(uint32_t light_set) const;  // constant time
+    bool busy() const { return !pieces_.empty() || in_flight_; }
     LoadProgress progress() const { return {done_, total_}; }
     uint64_t deviceBytes() const { return staging_.size_bytes; }
 
    private:
-    struct Load {
-        uint32_t contribution;
-        uint64_t next_byte;
-    };
     Expected<void> create();
     Expected<bool> finished();  // the piece under way
-    Expected<void> send(const RecordStore& store, Load& load, uint64_t bytes);
+    Expected<void> send(const RecordStore& store);
     void rest();
 
     VulkanContext vulkan_;
@@ -42,11 +36,12 @@ class RecordLoader {
     GpuBuffer staging_;
     CommandBuffer commands_;
     FenceHandle fence_;
-    std::deque<Load> waiting_;
-    std::vector<bool> is_waiting_;  // by contribution
+    RecordQueue pieces_;
+    std::vector<uint32_t> left_;  // per light set, its contributions that are not on the device as a whole
     bool in_flight_ = false;
-    uint32_t piece_of_ = 0;  // the contribution that is under way
-    uint64_t piece_ = 0;     // and its bytes
+    std::vector<VkBufferCopy> regions_;  // of the piece that is under way
+    std::vector<uint32_t> ends_;         // the light sets of contributions that are whole with it
+    uint64_t piece_ = 0;                 // its bytes
     uint64_t done_ = 0, total_ = 0;
 };
 

@@ -66,11 +66,14 @@ void seeOtherQueue(VkCommandBuffer commands) {
 
 }  // namespace
 
-// visit(k) for the contributions of a light set that are stored anywhere.
-template <class Visit>
-void forEachContribution(const PackData& data, LightSet set, Visit&& visit) {
-    for (uint32_t k = 0; k < data.contributions.size(); ++k)
-        if (data.contributions[k].light_set == set.element && data.contributions[k].receivers > 0) visit(k);
+// Per element, the contributions of that light set that are stored anywhere.
+std::vector<std::vector<uint32_t>> contributionsOfSets(const PackData& data) {
+    std::vector<std::vector<uint32_t>> found(data.elements.size());
+    for (uint32_t k = 0; k < data.contributions.size(); ++k) {
+        const Contribution& contribution = data.contributions[k];
+        if (contribution.light_set && contribution.receivers > 0) found[*contribution.light_set].push_back(k);
+    }
+    return found;
 }
 
 // Everything on the device. Members are destroyed in reverse, after waiting for what submit() sent.
@@ -97,9 +100,10 @@ struct Runtime::Impl {
         uint32_t target, probe_target, front, probe_front;
     };
     std::optional<Recording> recorded;
-    std::optional<RecordLoader> loader;  // none in modes that load nothing later
-    std::vector<LightSet> loading;       // sets whose records are on their way
-    std::vector<RecordsState> records;   // per element
+    std::optional<RecordLoader> loader;                // none in modes that load nothing later
+    std::vector<LightSet> loading;                     // sets whose records are on their way
+    std::vector<RecordsState> records;                 // per element
+    std::vector<std::vector<uint32_t>> contributions;  // likewise
     std::optional<UpdateTimer> timer;
     CommandBuffer own;
     SemaphoreHandle timeline;
@@ -268,6 +272,7 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     impl->functions = std::move(*functions);
     impl->vulkan = vulkan;
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
+    impl->contributions = contributionsOfSets(pack.data());
     impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
     Runtime runtime(pack, std::move(impl), options.moving_probes_max);
     DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(),
@@ -454,25 +459,24 @@ Expected<void> Runtime::dropRecords(LightSet set) {
     for (uint32_t i = 0; i < impl_->pages.size(); ++i) planner(i).startOver();
     impl_->records[set.element] = RecordsState::Dropped;
     std::erase_if(impl_->loading, [&](LightSet other) { return other.element == set.element; });
-    forEachContribution(pack().data(), set, [&](uint32_t k) {
-        impl_->loader->cancel(k);
-        impl_->executor->records()->release(k);
-    });
+    if (!impl_->loader) return {};  // nothing is stored of any set
+    RecordStore& store = *impl_->executor->records();
+    impl_->loader->cancel(set.element, store);
+    for (const uint32_t k : impl_->contributions[set.element]) store.release(k);
     return {};
 }
 
 Expected<void> Runtime::loadRecords(LightSet set) {
     DIMMER_TRY(checkLoadable(set));
     if (impl_->records[set.element] != RecordsState::Dropped) return {};
-    Expected<void> room;
-    forEachContribution(pack().data(), set, [&](uint32_t k) {
-        if (room) room = impl_->executor->records()->reserve(k);
-    });
-    if (!room) {
-        forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->executor->records()->release(k); });
+    const auto& contributions = impl_->contributions[set.element];
+    for (const uint32_t k : contributions) {
+        const auto room = impl_->executor->records()->reserve(k);
+        if (room) continue;
+        for (const uint32_t other : contributions) impl_->executor->records()->release(other);
         return room;
     }
-    forEachContribution(pack().data(), set, [&](uint32_t k) { impl_->loader->add(k, *impl_->executor->records()); });
+    if (impl_->loader) impl_->loader->add(set.element, contributions, *impl_->executor->records());
     impl_->records[set.element] = RecordsState::Loading;
     impl_->loading.push_back(set);
     return {};
@@ -485,9 +489,7 @@ RecordsState Runtime::recordsState(LightSet set) const {
 // Sets of which nothing is on its way any more.
 void Runtime::finishLoading() {
     std::erase_if(impl_->loading, [&](LightSet set) {
-        bool pending = false;
-        forEachContribution(pack().data(), set, [&](uint32_t k) { pending |= impl_->loader->pending(k); });
-        if (pending) return false;
+        if (impl_->loader && impl_->loader->pending(set.element)) return false;
         impl_->records[set.element] = RecordsState::Loaded;
         hold(set, false);
         return true;

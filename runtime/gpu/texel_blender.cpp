@@ -1,5 +1,7 @@
 #include <gpu/texel_blender.h>
 
+#include <gpu/record_queue.h>
+
 #include <fmt/format.h>
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
@@ -99,13 +101,19 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
 
 // Of every contribution, or of those without a light set, which nothing can load later.
 Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& transfer, bool all) {
+    RecordQueue queue;
     for (uint32_t k = 0; k < data.contributions.size(); ++k) {
         if (!all && data.contributions[k].light_set) continue;
         DIMMER_TRY(records_.reserve(k));
-        DIMMER_TRY(transfer.upload(
-            records_.buffer(), records_.byteCount(k),
-            [&](VkDeviceSize offset, std::span<std::byte> piece) { records_.fill(k, offset, piece); },
-            records_.firstByte(k)));
+        queue.add(RecordQueue::no_light_set, k, records_);
+    }
+    std::vector<VkBufferCopy> regions;
+    std::vector<uint32_t> ended;
+    while (!queue.empty()) {
+        const uint64_t bytes =
+            queue.fill(records_, std::span(transfer.staging().mapped, Transfer::staging_bytes), regions);
+        DIMMER_TRY(transfer.send(records_.buffer(), regions));
+        queue.advance(records_, bytes, ended);
     }
     return {};
 }

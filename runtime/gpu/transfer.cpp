@@ -63,22 +63,25 @@ Expected<void> Transfer::run(const std::function<void(VkCommandBuffer)>& record)
     return {};
 }
 
+Expected<void> Transfer::send(VkBuffer target, std::span<const VkBufferCopy> regions) {
+    return run([&](VkCommandBuffer commands) {
+        vkCmdCopyBuffer(commands, staging_.buffer.get(), target, static_cast<uint32_t>(regions.size()), regions.data());
+        auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
+        barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
+        barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
+        vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 1,
+                             &barrier, 0, nullptr, 0, nullptr);
+    });
+}
+
 Expected<void> Transfer::upload(VkBuffer target, VkDeviceSize size_bytes,
                                 const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill,
                                 VkDeviceSize target_offset) {
     for (VkDeviceSize offset = 0; offset < size_bytes; offset += staging_bytes) {
         const VkDeviceSize piece_bytes = std::min(staging_bytes, size_bytes - offset);
         fill(offset, std::span(staging_.mapped, piece_bytes));
-        DIMMER_TRY(run([&](VkCommandBuffer commands) {
-            const VkBufferCopy region{.srcOffset = 0, .dstOffset = target_offset + offset, .size = piece_bytes};
-            vkCmdCopyBuffer(commands, staging_.buffer.get(), target, 1, &region);
-            // To whatever later submissions of any kind read.
-            auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
-            barrier.srcAccessMask = VK_ACCESS_TRANSFER_WRITE_BIT;
-            barrier.dstAccessMask = VK_ACCESS_SHADER_READ_BIT;
-            vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_ALL_COMMANDS_BIT, 0, 1,
-                                 &barrier, 0, nullptr, 0, nullptr);
-        }));
+        const VkBufferCopy region{.srcOffset = 0, .dstOffset = target_offset + offset, .size = piece_bytes};
+        DIMMER_TRY(send(target, std::span(&region, 1)));
     }
     return {};
 }

@@ -23,6 +23,9 @@ class Transfer {
                           const std::function<void(VkDeviceSize offset, std::span<std::byte> piece)>& fill,
                           VkDeviceSize target_offset = 0);
 
+    // Copies parts of staging() to `target` and blocks until they are there, for whatever later submissions read.
+    Expected<void> send(VkBuffer target, std::span<const VkBufferCopy> regions);
+
     const GpuBuffer& staging() const { return staging_; }
 
    private:

@@ -274,6 +274,19 @@ TEST_F(RecordsTest, StagingMemoryIsHeldOnlyWhileLoading) {
     EXPECT_EQ(gpu.footprint().bytes, before);
 }
 
+TEST_F(RecordsTest, APieceHoldsManySmallContributions) {
+    Runtime gpu = runtimeOf(packOf(test::randomPack(78)), {.load_records = false});
+    for (uint32_t set = 0; set < 9; ++set) ASSERT_TRUE(gpu.loadRecords(LightSet{set}));
+    const auto begun = gpu.continueLoading(1 << 20);
+    ASSERT_TRUE(begun);
+    ASSERT_LT(begun->total_bytes, 1u << 20);
+    ASSERT_EQ(vkDeviceWaitIdle(device().context().device), VK_SUCCESS);
+    const auto progress = gpu.continueLoading(1 << 20);
+    ASSERT_TRUE(progress);
+    EXPECT_EQ(progress->done_bytes, progress->total_bytes);
+    for (uint32_t set = 0; set < 9; ++set) EXPECT_EQ(gpu.recordsState(LightSet{set}), RecordsState::Loaded);
+}
+
 TEST_F(RecordsTest, MayBeDestroyedAndDroppedInTheMiddleOfLoading) {
     Runtime gpu = runtimeOf(packOf(test::randomPack(77)), {.load_records = false});
     for (uint32_t set = 0; set < 9; ++set) ASSERT_TRUE(gpu.loadRecords(LightSet{set}));
