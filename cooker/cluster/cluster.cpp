@@ -1,5 +1,6 @@
 #include <cluster/cluster.h>
 
+#include <cluster/merge.h>
 #include <encode/encode.h>
 #include <encode/encode_probe.h>
 #include <pack/batches.h>
@@ -53,22 +54,24 @@ class Grouping {
         if (!signature_.first.empty()) members_[signature_].push_back(item);
     }
 
-    // Clusters by their number of contributions, as updates take them, and in their items' order among equals: what a
-    // dispatch reads lies together, and neighbours in the file are neighbours on the page.
-    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
-    using Entry = std::pair<const Signature, std::vector<uint32_t>>;
-    std::vector<const Entry*> ordered() const {
-        std::vector<const Entry*> order;
-        for (const Entry& cluster : members_) order.push_back(&cluster);
-        std::ranges::sort(order, {},
-                          [](const Entry* c) { return std::pair(c->first.first.size(), c->second.front()); });
-        return order;
+    std::vector<Group> groups() && {
+        std::vector<Group> all;
+        for (auto& [signature, items] : members_) all.push_back({signature.first, signature.second, std::move(items)});
+        return all;
     }
 
    private:
-    std::map<Signature, std::vector<uint32_t>> members_;  // -> items
+    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
+    std::map<Signature, std::vector<uint32_t>> members_;           // -> items
     Signature signature_;
 };
+
+// Clusters by their number of contributions, as updates take them, and in their items' order among equals: what a
+// dispatch reads lies together, and neighbours in the file are neighbours on the page.
+std::vector<Group> ordered(std::vector<Group> groups) {
+    std::ranges::sort(groups, {}, [](const Group& g) { return std::pair(g.contributions.size(), g.items.front()); });
+    return groups;
+}
 
 // What clusters of one kind of receiver are told by.
 template <class Record>
@@ -100,24 +103,27 @@ void appendCluster(const std::vector<uint32_t>& contributions, uint32_t receiver
 // `receiverOf(item)`: its address or number; `lightOf(item)`: its row; `encode(light)`: a record; `cut(first, count)`
 // appends the batches of a cluster's receivers. Returns the number of records per contribution.
 template <class Record>
-std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions, Tables<Record> tables,
-                                 auto&& receiverOf, auto&& lightOf, auto&& encode, auto&& cut) {
+std::vector<uint32_t> fillTables(const std::vector<Group>& clusters, std::span<const uint32_t> contribution_of_term,
+                                 size_t contributions, Tables<Record> tables, auto&& receiverOf, auto&& lightOf,
+                                 auto&& encode, auto&& cut) {
     std::vector<uint32_t> record_counts(contributions, 0);
-    const auto clusters = grouping.ordered();
-    for (const auto* cluster : clusters) {
-        for (uint32_t item : cluster->second) tables.receivers.push_back(receiverOf(item));
-        appendCluster(cluster->first.first, static_cast<uint32_t>(cluster->second.size()), tables, record_counts, cut);
+    for (const Group& cluster : clusters) {
+        for (uint32_t item : cluster.items) tables.receivers.push_back(receiverOf(item));
+        appendCluster(cluster.contributions, static_cast<uint32_t>(cluster.items.size()), tables, record_counts, cut);
     }
     std::vector<uint32_t> first_record(contributions + 1, 0);
     std::partial_sum(record_counts.begin(), record_counts.end(), first_record.begin() + 1);
     for (ClusterTerm& term : tables.terms) term.first_record += first_record[term.contribution];
-    tables.payload.resize(first_record.back());
+    tables.payload.assign(first_record.back(), encode({}));  // contributions that a receiver of a cluster does not have
     tbb::parallel_for(size_t{0}, clusters.size(), [&](size_t c) {
-        const std::vector<uint32_t>& items = clusters[c]->second;
+        const std::vector<uint32_t>& items = clusters[c].items;
         for (size_t i = 0; i < items.size(); ++i) {
             size_t term = tables.clusters[c].first_term;
-            for (const auto& l : lightOf(items[i]))
-                if (l.term != always_group) tables.payload[tables.terms[term++].first_record + i] = encode(l.light);
+            for (const auto& l : lightOf(items[i])) {
+                if (l.term == always_group) continue;
+                while (tables.terms[term].contribution != contribution_of_term[l.term]) ++term;
+                tables.payload[tables.terms[term].first_record + i] = encode(l.light);
+            }
         }
     });
     return record_counts;
@@ -126,7 +132,7 @@ std::vector<uint32_t> fillTables(const Grouping& grouping, size_t contributions,
 }  // namespace
 
 void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
-                   PackData& pack) {
+                   uint32_t overlap_max, PackData& pack) {
     const std::vector<Target> targets = listTargets(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
@@ -139,8 +145,11 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
     });
+    std::vector<uint64_t> tiles;
+    for (const Target& target : targets) tiles.push_back(target.order >> 8);
     const auto counts = fillTables<TexelRecord>(
-        grouping, pack.contributions.size(), {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
+        ordered(mergeGroups(std::move(grouping).groups(), tiles, overlap_max)), contribution_of_term,
+        pack.contributions.size(), {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
         [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
@@ -161,7 +170,7 @@ void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contributi
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
     });
     probes.record_counts = fillTables<ProbeRecord>(
-        grouping, pack.contributions.size(),
+        ordered(std::move(grouping).groups()), contribution_of_term, pack.contributions.size(),
         {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{}, row,
         [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
         [&](uint32_t first, uint32_t count) {

@@ -98,7 +98,7 @@ PackData encodePack(const ChartedLevel& level, const Texels& texels, const Baked
     pack.direction_model = profile.direction_model;
     pack.exposure = chooseExposure(baked, max_weights);
     if (auto warning = coarseExposure(scene, pack.exposure)) stats.warnings.push_back(std::move(*warning));
-    buildClusters(texels, baked, contribution_of_term, pack);
+    buildClusters(texels, baked, contribution_of_term, profile.overlap_max, pack);
     buildProbeClusters(baked, contribution_of_term, pack);
     pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));
     stats.free_volume_m3 = baked.grid.free_volume_m3;

@@ -75,6 +75,7 @@ std::vector<float> regionOf(const PackData& d, uint32_t element) {
             if (!holds(d.contributions[d.terms[t].contribution], element)) continue;
             for (uint32_t i = 0; i < cluster.receiver_count; ++i) {
                 const TexelRecord& record = d.payload[d.terms[t].first_record + i];
+                if (record.irradiance == 0) continue;  // its cluster's neighbours have that contribution
                 const auto [r, g, b] = decodeColor(d.color_format, canonical(d.color_format, record).irradiance);
                 float& sum = light[cluster.first_receiver + i];
                 sum = std::max(sum, 0.0f) + dimmer::luminance(r, g, b);

@@ -34,7 +34,7 @@ struct ClusterTerm {
     uint32_t first_record = 0;  // into payload, one record per receiver of the cluster, in its order
 };
 
-// Receivers with the same list of contributions.
+// Receivers with the same list of contributions; some of their records may be without light.
 struct Cluster {
     uint32_t first_receiver = 0, receiver_count = 0;
     uint32_t first_batch = 0, batch_count = 0;

@@ -1,0 +1,144 @@
+#include <cluster/merge.h>
+
+#include <pack/pack_data.h>
+#include <update/device_places.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <set>
+#include <unordered_map>
+
+namespace dimmer::cook {
+namespace {
+
+// Device memory that depends on the lists: records of all contributions and of the base, and the largest work list.
+int64_t bytesOf(size_t receivers, size_t contributions) {
+    const size_t records = paddedReceivers(static_cast<uint32_t>(receivers)) * (contributions + 1);
+    const size_t batches = (receivers + batch_receivers_max - 1) / batch_receivers_max;
+    return static_cast<int64_t>(records * sizeof(TexelRecord) + contributions * sizeof(WorkTerm) +
+                                batches * (sizeof(TexelBatch) + sizeof(TexelItem)));
+}
+
+size_t unionSize(std::span<const uint32_t> a, std::span<const uint32_t> b) {
+    size_t i = 0, j = 0, common = 0;
+    while (i < a.size() && j < b.size()) {
+        const uint32_t lower = std::min(a[i], b[j]);
+        common += a[i] == b[j];
+        const bool in_a = a[i] == lower, in_b = b[j] == lower;
+        i += in_a, j += in_b;
+    }
+    return a.size() + b.size() - common;
+}
+
+std::vector<uint32_t> unionOf(std::span<const uint32_t> a, std::span<const uint32_t> b) {
+    std::vector<uint32_t> all;
+    std::ranges::set_union(a, b, std::back_inserter(all));
+    return all;
+}
+
+class Merger {
+   public:
+    Merger(std::vector<Group> groups, std::span<const uint64_t> tile_of_item, uint32_t contributions_max)
+        : groups_(std::move(groups)),
+          tile_of_item_(tile_of_item),
+          contributions_max_(contributions_max == 0 ? UINT32_MAX : contributions_max) {
+        for (uint32_t g = 0; g < groups_.size(); ++g) enter(g);
+    }
+
+    std::vector<Group> run() {
+        while (!waiting_.empty()) {
+            const uint32_t g = waiting_.extract(waiting_.begin()).value().group;
+            if (const auto other = best(g)) merge(g, *other);
+        }
+        return unique();
+    }
+
+   private:
+    struct Waiting {
+        size_t receivers;
+        uint32_t first_item, group;
+        auto operator<=>(const Waiting&) const = default;
+    };
+
+    void enter(uint32_t g) {
+        const Group& group = groups_[g];
+        uint64_t last = ~uint64_t{0};
+        for (const uint32_t item : group.items)
+            if (const uint64_t tile = tile_of_item_[item]; tile != last) in_tile_[last = tile].push_back(g);
+        waiting_.insert({group.items.size(), group.items.front(), g});
+    }
+
+    // The group with which joining saves most.
+    std::optional<uint32_t> best(uint32_t g) {
+        const Group& group = groups_[g];
+        const size_t receivers = group.items.size(), terms = group.contributions.size();
+        // One more contribution at each of its receivers, or each of the other's, which are as many or more.
+        if (receivers * sizeof(TexelRecord) > (terms + 1) * sizeof(WorkTerm)) return std::nullopt;
+        std::optional<uint32_t> found;
+        int64_t most = 0;
+        uint64_t last = ~uint64_t{0};
+        for (const uint32_t item : group.items) {
+            if (tile_of_item_[item] == last) continue;
+            last = tile_of_item_[item];
+            auto& near = in_tile_[last];
+            std::erase_if(near, [&](uint32_t other) { return groups_[other].items.empty(); });
+            for (const uint32_t other : near) {
+                if (other == g || groups_[other].page != group.page) continue;
+                const int64_t saved = savedBy(group, groups_[other]);
+                if (saved > most || (saved == most && found && other < *found)) most = saved, found = other;
+            }
+        }
+        return found;
+    }
+
+    int64_t savedBy(const Group& a, const Group& b) const {
+        const size_t receivers = a.items.size() + b.items.size();
+        const size_t contributions = unionSize(a.contributions, b.contributions);
+        if (contributions > contributions_max_) return 0;
+        return bytesOf(a.items.size(), a.contributions.size()) + bytesOf(b.items.size(), b.contributions.size()) -
+               bytesOf(receivers, contributions);
+    }
+
+    void merge(uint32_t g, uint32_t other) {
+        Group& a = groups_[g];
+        Group& b = groups_[other];
+        waiting_.erase({b.items.size(), b.items.front(), other});
+        Group joined{unionOf(a.contributions, b.contributions), a.page, {}};
+        std::ranges::merge(a.items, b.items, std::back_inserter(joined.items));
+        a = b = {};
+        groups_.push_back(std::move(joined));
+        enter(static_cast<uint32_t>(groups_.size()) - 1);
+    }
+
+    // Joined lists may be those of groups in other tiles.
+    std::vector<Group> unique() {
+        std::map<std::pair<std::vector<uint32_t>, uint32_t>, std::vector<uint32_t>> items_of;
+        for (Group& group : groups_) {
+            if (group.items.empty()) continue;
+            auto& items = items_of[{std::move(group.contributions), group.page}];
+            items.insert(items.end(), group.items.begin(), group.items.end());
+        }
+        std::vector<Group> found;
+        for (auto& [list, items] : items_of) {
+            std::ranges::sort(items);
+            found.push_back({list.first, list.second, std::move(items)});
+        }
+        return found;
+    }
+
+    std::vector<Group> groups_;  // those that were joined are empty
+    std::span<const uint64_t> tile_of_item_;
+    size_t contributions_max_;
+    std::unordered_map<uint64_t, std::vector<uint32_t>> in_tile_;
+    std::set<Waiting> waiting_;  // the smallest first
+};
+
+}  // namespace
+
+std::vector<Group> mergeGroups(std::vector<Group> groups, std::span<const uint64_t> tile_of_item,
+                               uint32_t contributions_max) {
+    return Merger(std::move(groups), tile_of_item, contributions_max).run();
+}
+
+}  // namespace dimmer::cook
