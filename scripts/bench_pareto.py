@@ -31,6 +31,7 @@ GRID_AXIS = [20, 40, 100, 300, 1000, 3000]
 HOUSE_STATES = {"all on": "", "all off": "all=0", "alarm and desk": "all=0,alarm=1/0.2/0.2,desk=0.5",
                 "half, den open": "all=0.5,door:den=1", "front open": "all=0,door:front=1"}
 FLOOR_SHARE = 0.01  # of the mean light with all sets on, as `dimmer verify` has it
+UPDATE_SHORT_US = 300
 MEASURE = 2  # to be raised when errors() measures otherwise: what was kept by another measure is measured again
 
 
@@ -133,6 +134,13 @@ def errors(pack, truth, source="surface"):
     return over_states(values, {text: of_state for text, (_, of_state) in truth.items()})
 
 
+def timed(pack, frames):
+    """(report, case, times) of updates of all sets."""
+    bench = json.loads(dimmer("bench", pack, "--frames", frames, "--only", "all sets changed", "--json", "-"))
+    update = bench["cases"][0]
+    return bench, update, update["process_us" if bench["clock"] == "process" else "gpu_us"]
+
+
 def measure(level, configuration, truth):
     pack = level.folder / "pack.dimmer"
     before = cpu_seconds()
@@ -141,9 +149,9 @@ def measure(level, configuration, truth):
            "budgets.total=0", "--set", "budgets.dynamic=0", "--cache", level.cache, *settings)
     seconds = cpu_seconds() - before
     mean, p95 = errors(pack, truth)
-    bench = json.loads(dimmer("bench", pack, "--frames", 300, "--only", "all sets changed", "--json", "-"))
-    update = bench["cases"][0]
-    clock = update["process_us" if bench["clock"] == "process" else "gpu_us"]
+    bench, update, clock = timed(pack, 300)
+    if clock["min"] < UPDATE_SHORT_US:  # a moment of a shared machine decides otherwise
+        bench, update, clock = timed(pack, 3000)
     size = json.loads(dimmer("inspect", pack, "--json", "-"))
     return {"settings": configuration, "mean": mean, "p95": p95, "update_us": clock["min"],
             "roof": update.get("efficiency", 0), "bytes": size["bytes"]["device"], "file_bytes": size["bytes"]["file"],

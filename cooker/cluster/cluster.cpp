@@ -7,8 +7,11 @@
 
 #include <tbb/parallel_for.h>
 
+#include <glm/gtc/bitfield.hpp>
+
 #include <algorithm>
 #include <functional>
+#include <limits>
 #include <map>
 #include <numeric>
 
@@ -129,6 +132,29 @@ std::vector<uint32_t> fillTables(const std::vector<Group>& clusters, std::span<c
     return record_counts;
 }
 
+// Every 16 consecutive places of a space-filling curve (Morton) through the global grid are a tile, and as many
+// probes of models' grids, which follow each other there.
+std::vector<uint64_t> probeTiles(std::span<const ProbePosition> positions, size_t probes) {
+    constexpr size_t probes_per_tile = 16;
+    glm::vec3 lower(std::numeric_limits<float>::max()), upper(std::numeric_limits<float>::lowest());
+    for (const ProbePosition& p : positions) {
+        lower = glm::min(lower, {p.x_m, p.y_m, p.z_m});
+        upper = glm::max(upper, {p.x_m, p.y_m, p.z_m});
+    }
+    const float side_m = std::max({upper.x - lower.x, upper.y - lower.y, upper.z - lower.z, 1e-3f});
+    std::vector<std::pair<uint64_t, uint32_t>> curve;
+    for (uint32_t i = 0; i < positions.size(); ++i) {
+        const glm::vec3 p(positions[i].x_m, positions[i].y_m, positions[i].z_m);
+        const glm::u16vec3 cell((p - lower) / side_m * 65535.0f);
+        curve.emplace_back(glm::bitfieldInterleave(cell.x, cell.y, cell.z), i);
+    }
+    std::ranges::sort(curve);
+    std::vector<uint64_t> tiles(probes);
+    for (size_t rank = 0; rank < curve.size(); ++rank) tiles[curve[rank].second] = rank / probes_per_tile;
+    for (size_t i = curve.size(); i < probes; ++i) tiles[i] = probes + i / probes_per_tile;
+    return tiles;
+}
+
 }  // namespace
 
 void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
@@ -148,7 +174,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     std::vector<uint64_t> tiles;
     for (const Target& target : targets) tiles.push_back(target.order >> 8);
     const auto counts = fillTables<TexelRecord>(
-        ordered(mergeGroups(std::move(grouping).groups(), tiles, overlap_max)), contribution_of_term,
+        ordered(mergeGroups(std::move(grouping).groups(), tiles, texel_group_bytes, overlap_max)), contribution_of_term,
         pack.contributions.size(), {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
@@ -156,7 +182,8 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
 }
 
-void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, PackData& pack) {
+void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, uint32_t overlap_max,
+                        PackData& pack) {
     const size_t global = baked.grid.light.rows(), all = global + baked.local_light.rows();
     if (all == 0) return;
     const auto row = [&](size_t i) { return i < global ? baked.grid.light.row(i) : baked.local_light.row(i - global); };
@@ -170,7 +197,9 @@ void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contributi
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);
     });
     probes.record_counts = fillTables<ProbeRecord>(
-        ordered(std::move(grouping).groups()), contribution_of_term, pack.contributions.size(),
+        ordered(mergeGroups(std::move(grouping).groups(), probeTiles(baked.grid.grid.positions, all), probe_group_bytes,
+                            overlap_max)),
+        contribution_of_term, pack.contributions.size(),
         {probes.clusters, probes.terms, probes.batches, probes.numbers, probes.payload}, std::identity{}, row,
         [&](const ProbeLight& light) { return encodeProbe(light, encoding); },
         [&](uint32_t first, uint32_t count) {

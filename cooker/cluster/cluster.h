@@ -20,6 +20,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
 
 // The same for light probes, global ones first: fills pack.probes but its local grids. Within a cluster probes follow
 // their numbers.
-void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, PackData& pack);
+void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contribution_of_term, uint32_t overlap_max,
+                        PackData& pack);
 
 }  // namespace dimmer::cook

@@ -12,14 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-// Device memory that depends on the lists: records of all contributions and of the base, and the largest work list.
-int64_t bytesOf(size_t receivers, size_t contributions) {
-    const size_t records = paddedReceivers(static_cast<uint32_t>(receivers)) * (contributions + 1);
-    const size_t batches = (receivers + batch_receivers_max - 1) / batch_receivers_max;
-    return static_cast<int64_t>(records * sizeof(TexelRecord) + contributions * sizeof(WorkTerm) +
-                                batches * (sizeof(TexelBatch) + sizeof(TexelItem)));
-}
-
 size_t unionSize(std::span<const uint32_t> a, std::span<const uint32_t> b) {
     size_t i = 0, j = 0, common = 0;
     while (i < a.size() && j < b.size()) {
@@ -39,9 +31,11 @@ std::vector<uint32_t> unionOf(std::span<const uint32_t> a, std::span<const uint3
 
 class Merger {
    public:
-    Merger(std::vector<Group> groups, std::span<const uint64_t> tile_of_item, uint32_t contributions_max)
+    Merger(std::vector<Group> groups, std::span<const uint64_t> tile_of_item, const GroupBytes& bytes,
+           uint32_t contributions_max)
         : groups_(std::move(groups)),
           tile_of_item_(tile_of_item),
+          bytes_(bytes),
           contributions_max_(contributions_max == 0 ? UINT32_MAX : contributions_max) {
         for (uint32_t g = 0; g < groups_.size(); ++g) enter(g);
     }
@@ -74,7 +68,7 @@ class Merger {
         const Group& group = groups_[g];
         const size_t receivers = group.items.size(), terms = group.contributions.size();
         // One more contribution at each of its receivers, or each of the other's, which are as many or more.
-        if (receivers * sizeof(TexelRecord) > (terms + 1) * sizeof(WorkTerm)) return std::nullopt;
+        if (receivers * bytes_.record > terms * bytes_.term + bytes_.batch) return std::nullopt;
         std::optional<uint32_t> found;
         int64_t most = 0;
         uint64_t last = ~uint64_t{0};
@@ -96,8 +90,8 @@ class Merger {
         const size_t receivers = a.items.size() + b.items.size();
         const size_t contributions = unionSize(a.contributions, b.contributions);
         if (contributions > contributions_max_) return 0;
-        return bytesOf(a.items.size(), a.contributions.size()) + bytesOf(b.items.size(), b.contributions.size()) -
-               bytesOf(receivers, contributions);
+        return bytes_.of(a.items.size(), a.contributions.size()) + bytes_.of(b.items.size(), b.contributions.size()) -
+               bytes_.of(receivers, contributions);
     }
 
     void merge(uint32_t g, uint32_t other) {
@@ -129,6 +123,7 @@ class Merger {
 
     std::vector<Group> groups_;  // those that were joined are empty
     std::span<const uint64_t> tile_of_item_;
+    GroupBytes bytes_;
     size_t contributions_max_;
     std::unordered_map<uint64_t, std::vector<uint32_t>> in_tile_;
     std::set<Waiting> waiting_;  // the smallest first
@@ -136,9 +131,22 @@ class Merger {
 
 }  // namespace
 
+int64_t GroupBytes::of(size_t receivers, size_t contributions) const {
+    const size_t records = (receivers + step - 1) / step * step * (contributions + 1);
+    const size_t batches = (receivers + batch_receivers_max - 1) / batch_receivers_max;
+    return static_cast<int64_t>(records * record + contributions * term + batches * batch);
+}
+
+const GroupBytes texel_group_bytes{.record = sizeof(TexelRecord),
+                                   .step = paddedReceivers(1),
+                                   .term = sizeof(WorkTerm),
+                                   .batch = sizeof(TexelBatch) + sizeof(TexelItem)};
+const GroupBytes probe_group_bytes{
+    .record = sizeof(ProbeRecord), .step = 1, .term = sizeof(WorkTerm), .batch = sizeof(BatchPlace) + sizeof(WorkItem)};
+
 std::vector<Group> mergeGroups(std::vector<Group> groups, std::span<const uint64_t> tile_of_item,
-                               uint32_t contributions_max) {
-    return Merger(std::move(groups), tile_of_item, contributions_max).run();
+                               const GroupBytes& bytes, uint32_t contributions_max) {
+    return Merger(std::move(groups), tile_of_item, bytes, contributions_max).run();
 }
 
 }  // namespace dimmer::cook

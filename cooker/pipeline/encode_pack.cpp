@@ -99,7 +99,7 @@ PackData encodePack(const ChartedLevel& level, const Texels& texels, const Baked
     pack.exposure = chooseExposure(baked, max_weights);
     if (auto warning = coarseExposure(scene, pack.exposure)) stats.warnings.push_back(std::move(*warning));
     buildClusters(texels, baked, contribution_of_term, profile.overlap_max, pack);
-    buildProbeClusters(baked, contribution_of_term, pack);
+    buildProbeClusters(baked, contribution_of_term, profile.overlap_max, pack);
     pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));
     stats.free_volume_m3 = baked.grid.free_volume_m3;
     pack.meshes = levelMeshes(*level.rays, level.charts, level.scales.emission_cd_m2);

@@ -27,8 +27,8 @@ size_t deviceBytes(const std::vector<Group>& groups) {
 TEST(MergeGroups, AHandfulOfTexelsJoinsALongListBesideIt) {
     // One record of the 20th contribution at 2 texels (16 bytes) against 19 terms of a work list (304).
     const std::vector<uint64_t> one_tile(12, 7);
-    const auto merged =
-        mergeGroups({{counting(0, 20), 0, counting(0, 10)}, {counting(0, 19), 0, {10, 11}}}, one_tile, 0);
+    const auto merged = mergeGroups({{counting(0, 20), 0, counting(0, 10)}, {counting(0, 19), 0, {10, 11}}}, one_tile,
+                                    texel_group_bytes, 0);
     ASSERT_EQ(merged.size(), 1u);
     EXPECT_EQ(merged[0].contributions, counting(0, 20));
     EXPECT_EQ(merged[0].items, counting(0, 12));
@@ -41,7 +41,7 @@ TEST(MergeGroups, NeitherAcrossPagesNorFarAwayNorAboveTheLimitNorWhereItCostsMor
         std::fill(tiles.begin() + 10, tiles.end(), tile);
         return mergeGroups({{counting(0, 20), 0, counting(0, 10)},
                             {counting(first_contribution, 19), page, counting(10, receivers)}},
-                           tiles, contributions_max)
+                           tiles, texel_group_bytes, contributions_max)
             .size();
     };
     EXPECT_EQ(count(0, 7, 2, 1), 1u);
@@ -76,7 +76,7 @@ TEST(MergeGroups, NeverTakeMoreMemoryAndLoseNothing) {
         }
         std::vector<Group> groups;
         for (const auto& [contributions, items] : lists) groups.push_back({contributions, 0, items});
-        const auto merged = mergeGroups(groups, tiles, 0);
+        const auto merged = mergeGroups(groups, tiles, texel_group_bytes, 0);
         EXPECT_LT(merged.size(), groups.size() / 2);
         EXPECT_LT(deviceBytes(merged), deviceBytes(groups));
         std::vector<uint32_t> seen;
