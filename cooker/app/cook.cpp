@@ -1,6 +1,7 @@
 #include <app/command.h>
 #include <app/files.h>
 #include <app/json_progress.h>
+#include <app/pack_id.h>
 #include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
@@ -98,8 +99,9 @@ nlohmann::ordered_json suggestions(const CookStats& stats) {
     return list;
 }
 
-nlohmann::ordered_json toJson(const CookResult& result) {
+nlohmann::ordered_json toJson(const CookResult& result, const std::filesystem::path& pack) {
     nlohmann::ordered_json json;
+    json["pack_id"] = packId(pack);
     json["seconds"] = result.stats.seconds;
     auto& of_bake = json["bake_seconds"] = nlohmann::ordered_json::object();
     for (const auto& [stage, seconds] : result.stats.bake_seconds) of_bake[stage] = seconds;
@@ -166,7 +168,7 @@ Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
     }
     if (!a.report.empty())
         if (auto ok = writeReport(result, a); !ok) return ok;
-    return a.json.empty() ? Expected<void>() : writeJson(toJson(result), a.json);
+    return a.json.empty() ? Expected<void>() : writeJson(toJson(result, a.options.pack), a.json);
 }
 
 int run(const CookArguments& a) {

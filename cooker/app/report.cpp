@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/files.h>
+#include <app/pack_id.h>
 #include <pipeline/heat_map.h>
 #include <report/report.h>
 #include <write/pack_writer.h>
@@ -25,10 +26,20 @@ Expected<nlohmann::json> readJson(const std::string& file) {
     return json;
 }
 
+// Figures of another pack would be shown as this one's. Those of a version that named none are taken on trust.
+Expected<void> checkPackOf(const nlohmann::json& json, const std::string& file, const std::string& command,
+                           const std::string& pack) {
+    const auto id = json.is_object() ? json.find("pack_id") : json.end();
+    if (id == json.end() || *id == packId(pack)) return {};
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: it is of another pack than {}; run `dimmer {} --json` anew", file, pack, command));
+}
+
 // What `cook --json` wrote.
-Expected<void> addCook(const std::string& file, ReportInput& input) {
+Expected<void> addCook(const std::string& file, const std::string& pack, ReportInput& input) {
     const auto json = readJson(file);
     if (!json) return std::unexpected(json.error());
+    if (auto ok = checkPackOf(*json, file, "cook", pack); !ok) return ok;
     try {
         input.seconds = json->at("seconds").get<std::map<std::string, double>>();
         if (const auto of_bake = json->find("bake_seconds"); of_bake != json->end())
@@ -57,11 +68,12 @@ bool isVerifyReport(const nlohmann::json& json) {
     }
 }
 
-Expected<void> addVerify(const std::string& file, ReportInput& input) {
+Expected<void> addVerify(const std::string& file, const std::string& pack, ReportInput& input) {
     auto json = readJson(file);
     if (!json) return std::unexpected(json.error());
     if (!isVerifyReport(*json))
         return fail(ErrorCode::BadInput, fmt::format("{}: it is not what `dimmer verify --json` writes", file));
+    if (auto ok = checkPackOf(*json, file, "verify", pack); !ok) return ok;
     input.verify = std::move(*json);
     return {};
 }
@@ -77,9 +89,9 @@ int run(const ReportArguments& a) {
     std::error_code ignored;
     input.file_bytes = std::filesystem::file_size(a.pack, ignored);
     if (!a.cook_json.empty())
-        if (auto ok = addCook(a.cook_json, input); !ok) return reportError(ok.error());
+        if (auto ok = addCook(a.cook_json, a.pack, input); !ok) return reportError(ok.error());
     if (!a.verify_json.empty())
-        if (auto ok = addVerify(a.verify_json, input); !ok) return reportError(ok.error());
+        if (auto ok = addVerify(a.verify_json, a.pack, input); !ok) return reportError(ok.error());
     input.heat_maps = a.heat_maps;
     if (auto ok = writeReport(*pack, input, a.output); !ok) return reportError(ok.error());
     return exit_done;

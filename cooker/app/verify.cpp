@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/files.h>
+#include <app/pack_id.h>
 #include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/heat_map.h>
@@ -108,8 +109,9 @@ nlohmann::ordered_json toJson(const EffectFigures& f) {
             {"elsewhere", f.elsewhere}};
 }
 
-nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& options) {
+nlohmann::ordered_json toJson(const VerifyReport& r, const VerifyOptions& options, const std::string& pack) {
     nlohmann::ordered_json j;
+    j["pack_id"] = packId(pack);
     j["state"] = options.state;
     j["converged"] = r.converged;
     j["reference_relative_standard_error"] = r.surface.reference_error_mean;
@@ -174,7 +176,7 @@ int run(VerifyArguments a) {
     if (!a.csv.empty())
         if (auto ok = writeCsv(*report, a.csv); !ok) return reportError(ok.error());
     if (!a.json.empty())
-        if (auto ok = writeJson(toJson(*report, a.options), a.json); !ok) return reportError(ok.error());
+        if (auto ok = writeJson(toJson(*report, a.options, a.pack), a.json); !ok) return reportError(ok.error());
     if (a.json != "-") printReport(*report, a.options);
     if (a.max_error < 0 || report->surface.mean <= a.max_error) return exit_done;
     sayMessage(fmt::format("the mean error, {:.4f}, is above {}", report->surface.mean, a.max_error));

@@ -108,6 +108,11 @@ Expected<void> CacheStore::keep(std::string_view kind, const Key& key, std::span
     return writeFileAtomically(folder_ / name, encode(bytes, name), Flush::No);
 }
 
+void CacheStore::remove(const std::string& name) const {
+    std::error_code ignored;  // another cook's trim may have been first
+    fs::remove(folder_ / name, ignored);
+}
+
 std::vector<std::string> CacheStore::trim(uint64_t bytes_max) const {
     struct File {
         fs::path path;

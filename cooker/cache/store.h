@@ -37,6 +37,8 @@ class CacheStore {
     static std::string nameOf(std::string_view kind, const Key& key);
     Expected<void> keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const;
 
+    void remove(const std::string& name) const;
+
     // Removes the entries that were used least recently until all together have at most `bytes_max`, and what killed
     // cooks left behind. Returns the names of those that were removed.
     std::vector<std::string> trim(uint64_t bytes_max) const;

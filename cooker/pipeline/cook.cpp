@@ -6,6 +6,7 @@
 #include <pipeline/cook_within.h>
 #include <write/pack_writer.h>
 
+#include <fmt/format.h>
 #include <pack/pack_reader.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
@@ -68,9 +69,25 @@ Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOp
     if (auto entry = cache->findPack(key)) return takePack(std::move(*entry), result);
     auto bytes = makePack(scene, options, progress, cache, result);
     if (bytes)
-        cache->keepPack(key,
-                        {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations, {}});
+        cache->keepPack(
+            key, {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations, {}, {}});
     return bytes;
+}
+
+// A cache beside the pack may have taken the room that the pack needs.
+Expected<void> writePack(const CookOptions& options, std::span<const std::byte> bytes, CookCache* cache,
+                         std::vector<std::string>& warnings) {
+    auto written = writeFileAtomically(options.pack, bytes);
+    std::error_code unknown;
+    const auto space = std::filesystem::space(std::filesystem::absolute(options.pack).parent_path(), unknown);
+    if (written || unknown || space.available >= bytes.size() || !cache || !cache->removeKept()) return written;
+    written = writeFileAtomically(options.pack, bytes);
+    if (written)
+        warnings.push_back(
+            fmt::format("{}: there was room for the pack alone: what this cook had put into the cache was "
+                        "removed again. Free some, or set --cache or --no-cache.",
+                        options.pack.string()));
+    return written;
 }
 
 Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress& progress) {
@@ -109,7 +126,8 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     {
         const Stopwatch watch(result.stats.seconds["write"]);
         result.file_bytes = bytes->size();
-        if (auto ok = writeFileAtomically(options.pack, *bytes); !ok) return std::unexpected(ok.error());
+        if (auto ok = writePack(options, *bytes, cache ? &*cache : nullptr, result.stats.warnings); !ok)
+            return std::unexpected(ok.error());
     }
     result.stats.peak_bytes = peakBytes();
     return {};

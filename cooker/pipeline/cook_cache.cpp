@@ -35,6 +35,11 @@ std::vector<std::byte> toBytes(const PackEntry& entry) {
     }
     out.put(static_cast<uint32_t>(entry.parts.size()));
     for (const std::string& part : entry.parts) out.putString(part);
+    out.put(static_cast<uint32_t>(entry.depends.size()));
+    for (const auto& [part, key] : entry.depends) {
+        out.putString(part);
+        out.putString(key);
+    }
     out.putArray(std::span<const std::byte>(entry.pack));
     return out.take();
 }
@@ -50,6 +55,10 @@ std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
         second = in.getString();
     }
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.parts.push_back(in.getString());
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {
+        std::string part = in.getString();
+        entry.depends[std::move(part)] = in.getString();
+    }
     entry.pack = in.getArray<std::byte>();
     return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
 }
@@ -116,6 +125,7 @@ void CookCache::keep(std::string_view kind, const Key& key, std::span<const std:
 
 void CookCache::note(const std::string& name, const Expected<void>& kept) {
     used_.push_back(name);
+    if (kept) kept_.push_back(name);
     if (!kept && warnings_.empty()) warnings_.push_back("the cache takes no entries: " + kept.error().message);
 }
 
@@ -131,11 +141,12 @@ void CookCache::keepCharts(const Key& key, const ChartsEntry& entry) {
 std::optional<PackEntry> CookCache::findPack(const Key& key) {
     const auto bytes = find(pack_kind, "pack", key, {"code", "level", "settings"});
     auto entry = bytes ? packFromBytes(*bytes) : std::nullopt;
-    if (entry)
-        for (const std::string& part : entry->parts) {
-            store_.markUsed(part);
-            used_.push_back(part);
-        }
+    if (!entry) return entry;
+    for (const std::string& part : entry->parts) {
+        store_.markUsed(part);
+        used_.push_back(part);
+    }
+    now_.insert(entry->depends.begin(), entry->depends.end());  // a cook that finds all asks for no parts
     return entry;
 }
 
@@ -143,6 +154,7 @@ void CookCache::keepPack(const Key& key, PackEntry entry) {
     std::ranges::sort(used_);
     used_.erase(std::unique(used_.begin(), used_.end()), used_.end());
     entry.parts = used_;
+    entry.depends = now_;
     keep(pack_kind, key, toBytes(entry));
 }
 
@@ -256,7 +268,7 @@ void CookCache::keepRays(const Key& key, const RayEnds& ends) {
 }
 
 void CookCache::finish(uint64_t bytes_max) {
-    // A pack that was found whole asked for no parts: what is known of them stays.
+    // Of what this cook did not ask for, what is known stays.
     auto all = now_;
     all.insert(last_.begin(), last_.end());
     std::string ledger;
@@ -270,6 +282,11 @@ void CookCache::finish(uint64_t bytes_max) {
             fmt::format("{}: {} of the entries that this cook used do not fit the {} that the cache may hold, and were "
                         "removed: the next cook makes them again. Raise --cache-limit.",
                         store_.folder().string(), lost, humanBytes(bytes_max)));
+}
+
+bool CookCache::removeKept() {
+    for (const std::string& name : kept_) store_.remove(name);
+    return !std::exchange(kept_, {}).empty();
 }
 
 std::string describeGroup(const Scene& scene, uint32_t group) {

@@ -25,6 +25,7 @@ struct PackEntry {
     std::vector<std::string> warnings;
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> parts;  // names of the entries that it was made from: whoever finds the pack uses them too
+    std::map<std::string, std::string> depends;  // part -> key of what they depend on, as of CookCache::dependsOn
 };
 
 // The cache as one cook of one pack uses it. Remembers what the last cook of the pack depended on, to say what changed.
@@ -62,6 +63,9 @@ class CookCache {
     // very cook used.
     void finish(uint64_t bytes_max);
 
+    // Takes back what this cook has kept. False: that is nothing.
+    bool removeKept();
+
     const std::vector<CacheLine>& lines() const { return lines_; }
     // What did not work; the cook goes on without.
     const std::vector<std::string>& warnings() const { return warnings_; }
@@ -78,6 +82,7 @@ class CookCache {
     Key ledger_;
     std::map<std::string, std::string> last_, now_;  // part -> key
     std::vector<std::string> used_;                  // entries found or kept, by name
+    std::vector<std::string> kept_;                  // by this cook, likewise
     std::vector<CacheLine> lines_;
     std::vector<std::string> warnings_;
 };

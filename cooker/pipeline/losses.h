@@ -77,8 +77,12 @@ class LossTable {
     bool isLimited() const { return overlap_max_ != UINT32_MAX; }
     // Mean relative error of texels `factor` times as long, against those there are: of second differences of the light
     // along the pages, an eighth of which a box of a texel and bilinear filtering lose where light is smooth
-    // (sharpening wins most of it back, edges lose about as much).
-    double densityError(double factor) const { return (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4; }
+    // (sharpening wins most of it back, edges lose about as much). That holds for small errors and grows for ever;
+    // where it does not, what is returned nears 1, which is all the light there is.
+    double densityError(double factor) const {
+        const double error = (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4;
+        return error / (1 + error);
+    }
     // Of texels `factor` times as long, the share that is left of how many charts have, and of the pages, which charts
     // do not fill. Without charts, as area goes. Cost: packs the charts anew.
     struct TexelsLeft {

@@ -205,9 +205,11 @@ class TypeChecker {
             for (const auto& [key, value] : extensions->items())
                 if (std::ranges::count(read_extensions, key) > 0) ints(value, key, owner);
     }
-    // The parser takes null, and objects without members, for what is not there: a lamp would no longer be of its set.
+    // The parser takes null, and objects and lists without members, for what is not there: a lamp would no longer be of
+    // its set. No combinations are none either way.
     void stated(const json& value, const std::string& key, const std::string& owner) {
-        if ((value.is_null() || (value.is_object() && value.empty())) && problem_.empty())
+        const bool is_list = value.is_array() && key == "dimmer_combinations";
+        if (value.empty() && !is_list && problem_.empty())
             problem_ =
                 fmt::format("{}: {}: '{}' is {}. Give it a value, or leave it out.", file_, owner, key, value.dump());
     }

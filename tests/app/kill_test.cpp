@@ -2,6 +2,8 @@
 #include <app/tool_fixture.h>
 #include <dimmer/pack.h>
 
+#include <fmt/format.h>
+
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -70,6 +72,26 @@ TEST_F(Kill, AFullDiskAndAReadOnlyFolderAreSaid) {
                                       file("quick.json"), "--quality", "draft", "--no-cache"});
     EXPECT_EQ(read_only.exit_code, 2);
     EXPECT_THAT(read_only.err, testing::HasSubstr("/proc/level.dimmer"));
+}
+
+// A disk with room for the pack alone, whose cache would take that: in a name space of its own, where one may mount.
+TEST_F(Kill, ACacheLeavesThePackItsRoom) {
+    ASSERT_EQ(cook("alone.dimmer", {"--no-cache"}).exit_code, 0);
+    const std::string disk = file("disk"), pack = disk + "/level.dimmer";
+    std::filesystem::create_directory(disk);
+    constexpr uintmax_t page = 4096;
+    const auto pages = (std::filesystem::file_size(file("alone.dimmer")) + page - 1) / page + 1;
+    const std::string mount = fmt::format("mount -t tmpfs -o size={} tmpfs '{}'", pages * page, disk);
+    if (runProcess("/bin/sh", {"-c", "unshare -rm sh -c \"" + mount + "\""}).exit_code != 0)
+        GTEST_SKIP() << "nothing may be mounted here";
+    const auto result = runProcess(
+        "/bin/sh",
+        {"-c", fmt::format("unshare -rm sh -c \"{0} && '{1}' cook '{2}' -o '{3}' --profile '{4}' --quality draft; "
+                           "code=\\$?; cp '{3}' '{5}'; exit \\$code\"",
+                           mount, DIMMER_TOOL, file("level.gltf"), pack, file("quick.json"), file("copied.dimmer"))});
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_THAT(result.err, testing::HasSubstr("there was room for the pack alone"));
+    EXPECT_TRUE(readText(file("copied.dimmer")) == readText(file("alone.dimmer")));
 }
 
 }  // namespace

@@ -75,6 +75,9 @@ TEST_F(ReportTool, WhatIsRefused) {
         refused({"--verify", write("other.json", other)}, "not what `dimmer verify --json` writes");
     refused({"--verify", file("cook.json")}, "not what `dimmer verify --json` writes");
     refused({"--heatmap", file("nowhere")}, "page_0.png");
+    const auto second = cook("second.dimmer", {"--set", "records.threshold=0.2", "--json", file("second.json")});
+    ASSERT_EQ(second.exit_code, 0) << second.err;
+    refused({"--cook", file("second.json")}, "of another pack");
 }
 
 }  // namespace

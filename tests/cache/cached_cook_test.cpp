@@ -379,6 +379,18 @@ TEST_F(CachedCook, SaysWhy) {
     EXPECT_EQ(why(level, "charts"), "first cook of this pack here");
 }
 
+// A cook that finds its pack whole asks for no parts, and is the last one all the same.
+TEST_F(CachedCook, SaysWhySinceAPackThatWasFoundWhole) {
+    LevelFile level = houseOfTwo();
+    run(level, true);
+    LevelFile painted = level;
+    painted.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.6, 0.7, 0.7, 1};
+    run(painted, true);
+    EXPECT_EQ(why(level, "pack"), "");
+    lamp(level, 1)["intensity"] = 50;
+    EXPECT_EQ(why(level, "light set 'both'"), "lamps of light set 'both' changed");
+}
+
 TEST_F(CachedCook, KnowsAPackByItsPlaceHoweverItIsNamed) {
     const auto before = std::filesystem::current_path();
     std::filesystem::current_path(folder.path);
