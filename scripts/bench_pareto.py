@@ -134,24 +134,41 @@ def errors(pack, truth, source="surface"):
     return over_states(values, {text: of_state for text, (_, of_state) in truth.items()})
 
 
-def timed(pack, frames):
+def timed(pack):
     """(report, case, times) of updates of all sets."""
-    bench = json.loads(dimmer("bench", pack, "--frames", frames, "--only", "all sets changed", "--json", "-"))
-    update = bench["cases"][0]
-    return bench, update, update["process_us" if bench["clock"] == "process" else "gpu_us"]
+    for frames in (300, 3000):
+        bench = json.loads(dimmer("bench", pack, "--frames", frames, "--only", "all sets changed", "--json", "-"))
+        update = bench["cases"][0]
+        clock = update["process_us" if bench["clock"] == "process" else "gpu_us"]
+        if clock["min"] > UPDATE_SHORT_US:  # below, a moment of a shared machine decides
+            break
+    return bench, update, clock
 
 
-def measure(level, configuration, truth):
+def time_again(level):
+    """The lower of two times counts: other work on the machine only ever adds to one."""
+    for key, figures in level.results.items():
+        if "settings" not in figures:
+            continue
+        _, update, clock = timed(cook(level, figures["settings"]))
+        if clock["min"] < figures["update_us"]:
+            level.keep(key, figures | {"update_us": clock["min"], "roof": update.get("efficiency", 0)})
+
+
+def cook(level, configuration):
     pack = level.folder / "pack.dimmer"
-    before = cpu_seconds()
     settings = itertools.chain.from_iterable(("--set", f"{k}={v}") for k, v in configuration.items())
     dimmer("cook", level.path, "-o", pack, "--quality", level.quality, "--set", "grids.probes_max=0", "--set",
            "budgets.total=0", "--set", "budgets.dynamic=0", "--cache", level.cache, *settings)
+    return pack
+
+
+def measure(level, configuration, truth):
+    before = cpu_seconds()
+    pack = cook(level, configuration)
     seconds = cpu_seconds() - before
     mean, p95 = errors(pack, truth)
-    bench, update, clock = timed(pack, 300)
-    if clock["min"] < UPDATE_SHORT_US:  # a moment of a shared machine decides otherwise
-        bench, update, clock = timed(pack, 3000)
+    bench, update, clock = timed(pack)
     size = json.loads(dimmer("inspect", pack, "--json", "-"))
     return {"settings": configuration, "mean": mean, "p95": p95, "update_us": clock["min"],
             "roof": update.get("efficiency", 0), "bytes": size["bytes"]["device"], "file_bytes": size["bytes"]["file"],
@@ -281,6 +298,7 @@ def main():
     parser.add_argument("--levels", nargs="*", default=["two_rooms", "house", "lq_old_start", "lq_e2m2", "lq_e2m3"])
     parser.add_argument("--quality", default="draft", choices=["draft", "preview", "final"])
     parser.add_argument("--minutes", type=float, default=60, help="end after so long; the next run goes on from there")
+    parser.add_argument("--again", action="store_true", help="time every update once more; the lower time counts")
     parser.add_argument("--report-only", action="store_true", help="from what was measured before")
     options = parser.parse_args()
     names = [n for n in options.levels if n == "house" or ((LEVELS / f"{n}.glb").exists() and TRUTH.exists())]
@@ -294,6 +312,8 @@ def main():
             measure_level(level, begin + 60 * options.minutes * share)
             measure_causes(level)
             measure_grids(level)
+            if options.again:
+                time_again(level)
     levels = [level for level in levels if lightmap_results(level)]
     page = OUT / "pareto.html"
     page.write_text(report([(level.name, options.quality, lightmap_results(level),

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <span>
+#include <tuple>
 
 namespace dimmer::cook {
 namespace {
@@ -137,9 +139,7 @@ class WallCutter {
                 piece.corners.push_back({glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)});
             all.push_back(std::move(piece));
         }
-        std::vector<std::vector<Piece>> done;
-        split(std::move(all), cuts, chart.texels_per_metre, done);
-        return done;
+        return split(std::move(all), cuts, chart.texels_per_metre);
     }
 
     // Where pairs of surfaces, back to back and close together, stand on the chart's plane.
@@ -148,26 +148,35 @@ class WallCutter {
         const std::vector<Trace> traces =
             standing(findTraces(chart, wall_probe_low_m), findTraces(chart, wall_probe_high_m));
         std::vector<Cut> cuts;
-        for (const Trace& a : traces)
-            for (const Trace& b : traces) {
-                // A solid between a's front, looking back, and b's, looking forward.
-                if (a.axis != b.axis || a.forward || !b.forward) continue;
-                if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
+        for (const Trace& a : traces) {
+            if (a.forward) continue;
+            // A solid between a's front, looking back, and b's, looking forward.
+            for (const Trace& b : near(traces, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
                 const float from = std::max(a.from, b.from), to = std::min(a.to, b.to);
                 if (to - from > same_line_m) cuts.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
             }
+        }
         return joinCuts(std::move(cuts));
     }
 
+    static std::tuple<int, bool, float> placeOf(const Trace& t) { return {t.axis, t.forward, t.at}; }
+
+    // Of traces in the order of placeOf.
+    static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high) {
+        const auto first = std::ranges::lower_bound(sorted, std::tuple(axis, forward, low), {}, placeOf);
+        return {first, std::ranges::upper_bound(first, sorted.end(), std::tuple(axis, forward, high), {}, placeOf)};
+    }
+
     // What is there at both heights.
-    static std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Trace>& high) {
+    static std::vector<Trace> standing(const std::vector<Trace>& low, std::vector<Trace> high) {
+        std::ranges::sort(high, {}, placeOf);
         std::vector<Trace> both;
         for (const Trace& a : low)
-            for (const Trace& b : high) {
-                if (a.axis != b.axis || a.forward != b.forward || std::abs(a.at - b.at) > same_line_m) continue;
+            for (const Trace& b : near(high, a.axis, a.forward, a.at - same_line_m, a.at + same_line_m)) {
                 const Trace t{a.axis, a.at, std::max(a.from, b.from), std::min(a.to, b.to), a.forward};
                 if (t.to - t.from > same_line_m) both.push_back(t);
             }
+        std::ranges::sort(both, {}, placeOf);
         return both;
     }
 
@@ -232,11 +241,13 @@ class WallCutter {
     static std::vector<Cut> joinCuts(std::vector<Cut> cuts) {
         std::ranges::sort(cuts, {}, [](const Cut& c) { return std::tuple(c.axis, c.at, c.from, c.to); });
         std::vector<Cut> joined;
+        size_t first = 0;  // of those that are on the line of the cuts to come
         for (const Cut& c : cuts) {
-            auto same = std::ranges::find_if(joined, [&](const Cut& o) {
-                return o.axis == c.axis && std::abs(o.at - c.at) < same_line_m && c.from <= o.to + same_line_m &&
-                       o.from <= c.to + same_line_m;
-            });
+            while (first < joined.size() && (joined[first].axis != c.axis || !(c.at - joined[first].at < same_line_m)))
+                ++first;
+            const auto same = std::find_if(
+                joined.begin() + static_cast<std::ptrdiff_t>(first), joined.end(),
+                [&](const Cut& o) { return c.from <= o.to + same_line_m && o.from <= c.to + same_line_m; });
             if (same == joined.end()) {
                 joined.push_back(c);
                 continue;
@@ -248,12 +259,14 @@ class WallCutter {
     }
 
     // Between two ends, with what goes on beyond doorways: at a few texels per metre no stretch between them is long. A
-    // row of pillars, most of which is gap, is none.
+    // row of pillars, most of which is gap, is none. `cuts` ascend as joinCuts has them.
     static float wallLength(const Cut& cut, const std::vector<Cut>& cuts, float low, float high) {
         float whole = 0, first = high, last = low;
-        for (const Cut& c : cuts) {
-            const float from = std::max(c.from, low), to = std::min(c.to, high);
-            if (c.axis != cut.axis || std::abs(c.at - cut.at) >= same_line_m || from >= to) continue;
+        const auto place = [](const Cut& c) { return std::pair(c.axis, c.at); };
+        auto it = std::ranges::lower_bound(cuts, std::pair(cut.axis, cut.at - same_line_m), {}, place);
+        for (; it != cuts.end() && it->axis == cut.axis && it->at < cut.at + same_line_m; ++it) {
+            const float from = std::max(it->from, low), to = std::min(it->to, high);
+            if (std::abs(it->at - cut.at) >= same_line_m || from >= to) continue;
             whole += to - from;
             first = std::min(first, from);
             last = std::max(last, to);
@@ -261,15 +274,34 @@ class WallCutter {
         return wall_share_min * (last - first) < whole ? whole : std::min(cut.to, high) - std::max(cut.from, low);
     }
 
-    // The longest wall first; the others go on in the halves that they stand in.
-    void split(std::vector<Piece> pieces, const std::vector<Cut>& cuts, float texels_per_metre,
-               std::vector<std::vector<Piece>>& done) const {
-        glm::vec2 low(1e30f), high(-1e30f);
-        for (const Piece& p : pieces)
-            for (glm::vec2 c : p.corners) low = glm::min(low, c), high = glm::max(high, c);
+    // Those that stand on a rectangle, or on the line of one that does.
+    static std::vector<Cut> cutsOn(const std::vector<Cut>& cuts, glm::vec2 low, glm::vec2 high) {
+        std::vector<Cut> found;
+        std::ranges::copy_if(cuts, std::back_inserter(found), [&](const Cut& c) {
+            const int along = 1 - c.axis;
+            return c.at > low[c.axis] - same_line_m && c.at < high[c.axis] + same_line_m && c.from < high[along] &&
+                   c.to > low[along];
+        });
+        return found;
+    }
+
+    // What is left of a chart beside the walls so far, and the walls that stand on it.
+    struct Part {
+        std::vector<Piece> pieces;
+        std::vector<Cut> cuts;
+        glm::vec2 low{1e30f}, high{-1e30f};
+        Part(std::vector<Piece> of, const std::vector<Cut>& all_cuts) : pieces(std::move(of)) {
+            for (const Piece& p : pieces)
+                for (glm::vec2 c : p.corners) low = glm::min(low, c), high = glm::max(high, c);
+            cuts = cutsOn(all_cuts, low, high);
+        }
+    };
+
+    static std::optional<Cut> longestWall(const Part& part, float texels_per_metre) {
+        const auto& [pieces, cuts, low, high] = part;
         const float largest = std::max({-low.x, -low.y, high.x, high.y});
         const float margin = std::max(margin_m, rounding_share * largest);
-        const Cut* best = nullptr;
+        std::optional<Cut> best;
         float best_length = 0;
         for (const Cut& c : cuts) {
             const int along = 1 - c.axis;
@@ -277,21 +309,37 @@ class WallCutter {
             const float length = wallLength(c, cuts, low[along], high[along]);
             const float needed = std::min(length_min_texels / texels_per_metre, 0.5f * (high[along] - low[along]));
             if (length < needed || length <= best_length) continue;
-            best = &c;
+            best = c;
             best_length = length;
         }
-        if (!best) {
-            done.push_back(std::move(pieces));
-            return;
-        }
-        for (float sign : {-1.0f, 1.0f}) {
-            std::vector<Piece> side;
-            for (const Piece& p : pieces) {
-                Piece half{p.face, clip(p.corners, *best, sign)};
-                if (half.corners.size() >= 3 && area(half.corners) > 1e-8f) side.push_back(std::move(half));
+        return best;
+    }
+
+    // The longest wall first; the others go on in the halves that they stand in. No recursion: a row of equal walls is
+    // as deep as it is long.
+    static std::vector<std::vector<Piece>> split(std::vector<Piece> pieces, const std::vector<Cut>& cuts,
+                                                 float texels_per_metre) {
+        std::vector<std::vector<Piece>> done;
+        std::vector<Part> open;
+        open.emplace_back(std::move(pieces), cuts);
+        while (!open.empty()) {
+            Part part = std::move(open.back());
+            open.pop_back();
+            const auto wall = longestWall(part, texels_per_metre);
+            if (!wall) {
+                done.push_back(std::move(part.pieces));
+                continue;
             }
-            if (!side.empty()) split(std::move(side), cuts, texels_per_metre, done);
+            for (float sign : {1.0f, -1.0f}) {
+                std::vector<Piece> side;
+                for (const Piece& p : part.pieces) {
+                    Piece half{p.face, clip(p.corners, *wall, sign)};
+                    if (half.corners.size() >= 3 && area(half.corners) > 1e-8f) side.push_back(std::move(half));
+                }
+                if (!side.empty()) open.emplace_back(std::move(side), part.cuts);
+            }
         }
+        return done;
     }
 
     // Replaces the cut triangles of a mesh by their pieces, as fans.

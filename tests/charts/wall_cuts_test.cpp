@@ -181,6 +181,32 @@ TEST(WallCuts, EachOfManyRoomsHasItsFloorToItself) {
 
 // 200 km out floats are 1/64 m apart, more than the margin by which cuts keep off a rectangle's edge: a cut that
 // rounding put on the edge gave back the piece that it was made on, for ever.
+// Looked at again in every part that is cut off, against all others, these took minutes.
+TEST(WallCuts, ALongRowOfCellsIsCutAtEachWall) {
+    constexpr uint32_t walls = 4000;
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    const float half_m = 0.25f * (walls + 1);
+    addSolid(scene, "floor", {half_m, -0.1f, 0}, {half_m, 0.1f, 1.5f}, white);
+    for (uint32_t i = 0; i < walls; ++i)
+        addSolid(scene, "wall", {0.5f * static_cast<float>(i + 1), 1, 0}, {0.05f, 1, 1.5f}, white);
+    cutAtWalls(scene, 8);
+    // All of the floor's upper side, each cell 0.5 m wide, and each a part of its own.
+    constexpr size_t upper_side = 3;  // addSolid: x, y and z, low before high
+    const SceneMesh& floor = scene.meshes[upper_side];
+    ASSERT_EQ(floor.triangle_regions.size(), floor.triangles.size());
+    std::map<uint32_t, std::pair<float, float>> cells;
+    for (size_t t = 0; t < floor.triangles.size(); ++t)
+        for (int i = 0; i < 3; ++i) {
+            const glm::vec3 p = floor.positions_m[floor.triangles[t][i]];
+            if (floor.triangle_regions[t] == 0) continue;
+            auto& [low, high] = cells.try_emplace(floor.triangle_regions[t], p.x, p.x).first->second;
+            low = std::min(low, p.x), high = std::max(high, p.x);
+        }
+    EXPECT_EQ(cells.size(), walls + 1);
+    for (const auto& [region, cell] : cells) EXPECT_NEAR(cell.second - cell.first, 0.5f, 1e-3f);
+}
+
 TEST(WallCuts, EndFarFromTheOrigin) {
     Scene scene = twoRooms();
     for (SceneMesh& mesh : scene.meshes)
