@@ -210,6 +210,7 @@ class PlaceTrace {
         if (sum_.wants(always_group)) sum_[always_group];  // every site has some
         for (const uint32_t t : direct_.touched())
             if (sum_.wants(t)) sum_[t];
+        row.reserve(sum_.touched().size());
         for (const uint32_t t : sum_.touched()) {
             if (!sum_.wants(t)) continue;
             const ProbeLight& light = sum_[t];
@@ -369,14 +370,15 @@ std::vector<uint32_t> SiteLight::missingAt(size_t block) const {
     return groups;
 }
 
-// Of one block and group, from what was traced at the block's places.
+// Of one block and group, from what was traced at the block's places, whose rows ascend by group.
 Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t group) const {
     return Sparse<ProbeTermLight>::build(rows.size(), [&](size_t begin, size_t end, auto emit) {
         Row row;
         for (size_t i = begin; i < end; ++i) {
             row.clear();
-            for (const ProbeTermLight& l : rows[i])
-                if (paths_.terms()[l.term].group == group) row.push_back({paths_.numberInGroup(l.term), l.light, 0, 0});
+            for (const ProbeTermLight& l :
+                 std::ranges::equal_range(rows[i], group, {}, [&](const auto& of) { return groupOf(of); }))
+                row.push_back({paths_.numberInGroup(l.term), l.light, 0, 0});
             emit(std::span<const ProbeTermLight>(row));
         }
     });
@@ -431,11 +433,16 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
     return traced;
 }
 
-void SiteLight::share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups) {
+// Gives the rows' memory back as it goes: with hundreds of sets in sight of each other they are gigabytes.
+void SiteLight::share(std::span<Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups) {
     for (const size_t b : blocks) {
         const auto here = rows.first(blocks_[b].places_m.size());
         rows = rows.subspan(here.size());
+        tbb::parallel_for(size_t{0}, here.size(), [&](size_t i) {
+            std::ranges::sort(here[i], {}, [&](const auto& of) { return std::pair(groupOf(of), of.term); });
+        });
         for (const uint32_t g : groups) light_[g][b] = ofGroup(here, g);
+        for (Row& row : here) row = {};
     }
     for (const uint32_t g : groups)
         if (store_) store_->keepSites(g, blocks_, light_[g], blocks);

@@ -53,8 +53,9 @@ class SiteLight {
    private:
     using Row = std::vector<ProbeTermLight>;
     std::vector<uint32_t> missingAt(size_t block) const;
-    void share(std::span<const Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
+    void share(std::span<Row> rows, std::span<const size_t> blocks, std::span<const uint32_t> groups);
     Sparse<ProbeTermLight> ofGroup(std::span<const Row> rows, uint32_t group) const;
+    uint32_t groupOf(const ProbeTermLight& light) const { return paths_.terms()[light.term].group; }
     bool isMissing(uint32_t group, size_t block) const { return light_[group][block].rows() == 0; }
 
     std::span<const SiteBlock> blocks_;
