@@ -81,7 +81,8 @@ struct Runtime::Impl {
     VulkanFunctions functions;  // first: every other member calls them to its end
     VulkanContext vulkan;
     std::vector<LightmapPages> pages;  // one set, or two that take turns
-    uint32_t page_sets = 1;            // as asked for
+    uint32_t probe_sets = 1;           // likewise
+    uint32_t page_sets = 1;            // of both, as asked for
     // The sets of pages and of probes to sample, and those that the last plan writes. Probes are not limited, so they
     // change places with every update, pages when a state is complete.
     uint32_t front = 0, target = 0;
@@ -148,8 +149,7 @@ Expected<void> keepIn(std::optional<T>& slot, Expected<T> made) {
 Expected<void> Runtime::Impl::createProbes(const PackData& data, const Planner* probe_planner, const ModelSlots& models,
                                            Transfer& transfer) {
     if (data.probes.base.empty()) return {};
-    const auto set_count = static_cast<uint32_t>(pages.size());
-    DIMMER_TRY(keepIn(atlas, ProbeAtlas::create(vulkan, data, models.probesMax(), set_count, transfer)));
+    DIMMER_TRY(keepIn(atlas, ProbeAtlas::create(vulkan, data, models.probesMax(), probe_sets, transfer)));
     if (probe_planner) DIMMER_TRY(keepIn(probes, ProbeBlender::create(vulkan, data, *probe_planner, *atlas, transfer)));
     if (data.probes.global.empty()) return {};
     DIMMER_TRY(keepIn(grid_table, uploadGridTable(vulkan, data.probes.global, transfer)));
@@ -162,9 +162,11 @@ Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planne
     auto transfer = Transfer::create(vulkan, MemoryUse::Upload);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     // What never changes needs no second set.
-    const bool changes = !data.payload.empty() || probe_planner || models.probesMax() > 0;
-    const bool twice = options.buffering == Buffering::Double && changes;
-    DIMMER_TRY(createPages(data, twice ? 2 : 1, *transfer));
+    const bool pages_change = !data.payload.empty(), probes_change = probe_planner || models.probesMax() > 0;
+    const bool changes = pages_change || probes_change;
+    const bool twice = options.buffering == Buffering::Double;
+    probe_sets = twice && probes_change ? 2 : 1;
+    DIMMER_TRY(createPages(data, twice && pages_change ? 2 : 1, *transfer));
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
@@ -313,7 +315,7 @@ void Runtime::planTexels(UpdateStats& stats) {
 // The same of light probes and those of models.
 void Runtime::planProbes(UpdateStats& stats) {
     Impl& impl = *impl_;
-    const bool in_place = impl.pages.size() == 1;
+    const bool in_place = impl.probe_sets == 1;
     const auto upToDate = [&](uint32_t set) {
         return (!hasProbes() || probePlanner(set).upToDate()) && !models().dirty(set);
     };
@@ -519,7 +521,7 @@ uint32_t Runtime::probeSet() const {
 
 VkBuffer Runtime::probes(uint32_t probe_set) const {
     if (!impl_->atlas) return VK_NULL_HANDLE;
-    return impl_->atlas->buffer(std::min(probe_set, static_cast<uint32_t>(impl_->pages.size()) - 1));
+    return impl_->atlas->buffer(std::min(probe_set, impl_->probe_sets - 1));
 }
 
 VkBuffer Runtime::gridTable() const {

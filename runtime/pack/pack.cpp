@@ -6,9 +6,11 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
 #include <exception>
 #include <fstream>
 #include <new>
+#include <system_error>
 
 namespace dimmer {
 
@@ -34,10 +36,12 @@ Expected<Pack> Pack::open(const std::filesystem::path& path) {
     std::error_code error;
     const auto size = std::filesystem::file_size(path, error);
     std::ifstream file;
+    errno = 0;
     if (!error) file.open(path, std::ios::binary);  // a pipe, which has no size, would block
-    if (!file.is_open())
-        return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(),
-                                               error ? error.message() : "no permission to read"));
+    if (!file.is_open()) {
+        if (!error) error.assign(errno, std::generic_category());
+        return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(), error.message()));
+    }
     std::vector<std::byte> bytes;
     try {
         bytes.resize(size);

@@ -218,10 +218,13 @@ Expected<Model> ModelSlots::add(const ModelGrid& grid, const Transform& transfor
         return fail(ErrorCode::Unsupported, "The pack has no global light grid to light moving models from.");
     const auto first = pool_.allocate(granules(grid));
     if (!first)
-        return fail(ErrorCode::OutOfMemory,
-                    fmt::format("There is no room for a model of {} probes: {} models share {}, and the largest free "
-                                "range has {}. Remove one, or create the runtime with a higher moving_probes_max.",
-                                grid.probeCount(), model_count_, probes_max_, pool_.largestFree() * probes_granule));
+        return fail(
+            ErrorCode::OutOfMemory,
+            fmt::format("There is no room for a model of {} probes, which takes {}: {} models share {}, and the "
+                        "largest free range has {}. Remove one, or create the runtime with a higher "
+                        "moving_probes_max.",
+                        grid.probeCount(), granules(grid) * probes_granule, model_count_, probes_max_,
+                        pool_.largestFree() * probes_granule));
     if (free_slots_.empty()) {
         free_slots_.push_back(static_cast<uint32_t>(slots_.size()));
         slots_.emplace_back();

@@ -316,6 +316,28 @@ TEST_F(AsyncTest, WithoutLimitsTheNextUpdateIsExact) {
     }
 }
 
+// No texel changes: the second set would be memory that nothing writes.
+TEST_F(AsyncTest, PagesAreThereOnceWhereOnlyProbesChange) {
+    test::Random random(70);
+    PackData data = test::randomPack(70);
+    data.clusters.clear(), data.terms.clear(), data.batches.clear(), data.addresses.clear(), data.payload.clear();
+    for (Contribution& contribution : data.contributions) contribution.receivers = 0;
+    test::addRandomProbes(data, random);
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack, {.buffering = Buffering::Double});
+    CpuRuntime cpu(pack);
+    EXPECT_EQ(gpu.images(0).irradiance, gpu.images(1).irradiance);
+    EXPECT_NE(gpu.probes(0), gpu.probes(1));
+    for (int round = 0; round < 8; ++round) {
+        const std::string state = test::randomState(pack.data(), random);
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+        EXPECT_TRUE(std::ranges::equal(gpu.readPages()->probes, cpu.probes()));
+    }
+}
+
 TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpFor) {
     test::Random random(69);
     PackData data = test::randomPack(69);

@@ -161,7 +161,7 @@ dimmer_result dimmer_pack_get_model_mesh(const dimmer_pack* pack, uint32_t index
 typedef struct dimmer_lights dimmer_lights;
 
 /* On the CPU, with `thread_count` threads (1 to 1024, the caller's included) and room for `moving_probes_max` probes of
- * models that move (28 bytes each). Keeps what it needs of the pack alive. */
+ * models that move: 28 bytes each, and each model takes a multiple of 8. Keeps what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
 /* Null is allowed. Waits for what dimmer_lights_submit() sent, and for nothing else: of the caller's submissions those
@@ -221,7 +221,8 @@ typedef struct dimmer_model {
 
 /* The next update takes the model's probes from the level's global grid, and again whenever it moved or the light
  * around it changed. `world_from_model`: as of dimmer_placed_model. DIMMER_UNSUPPORTED where the pack has no global
- * grid, DIMMER_OUT_OF_MEMORY where moving_probes_max is reached. */
+ * grid, DIMMER_OUT_OF_MEMORY where no free range of moving_probes_max is long enough for its probes, in
+ * multiples of 8. */
 dimmer_result dimmer_lights_add_model(dimmer_lights* lights, const dimmer_model_grid* grid,
                                       const float world_from_model[12], dimmer_model* model);
 dimmer_result dimmer_lights_move_model(dimmer_lights* lights, dimmer_model model, const float world_from_model[12]);

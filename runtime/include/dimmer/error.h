@@ -10,13 +10,13 @@ namespace dimmer {
 
 enum class ErrorCode {
     InvalidArgument,  // the caller's value is out of its range; nothing was changed
-    NotFound,         // no light set, door or file of that name
+    NotFound,         // no light set, door or shipped profile of that name
     BadInput,         // a file's content cannot be used; the message says where and how to mend it
     Unsupported,      // the device or this build lacks something that is needed
     OutOfMemory,      // host or device memory
     DeviceLost,       // the Vulkan device is gone; destroy the runtime and create it anew
     OverBudget,       // the result does not fit the profile's budget
-    Io,               // a file could not be read or written
+    Io,               // a file is not there, or could not be read or written
     Internal,         // a broken promise of ours; please report it
 };
 
