@@ -37,7 +37,10 @@ class Merger {
           tile_of_item_(tile_of_item),
           bytes_(bytes),
           contributions_max_(contributions_max == 0 ? UINT32_MAX : contributions_max) {
-        for (uint32_t g = 0; g < groups_.size(); ++g) enter(g);
+        for (uint32_t g = 0; g < groups_.size(); ++g) {
+            enter(g, groups_[g].items);
+            waiting_.insert(waitingOf(g));
+        }
     }
 
     std::vector<Group> run() {
@@ -55,12 +58,12 @@ class Merger {
         auto operator<=>(const Waiting&) const = default;
     };
 
-    void enter(uint32_t g) {
-        const Group& group = groups_[g];
-        uint64_t last = ~uint64_t{0};
-        for (const uint32_t item : group.items)
-            if (const uint64_t tile = tile_of_item_[item]; tile != last) in_tile_[last = tile].push_back(g);
-        waiting_.insert({group.items.size(), group.items.front(), g});
+    Waiting waitingOf(uint32_t g) const { return {groups_[g].items.size(), groups_[g].items.front(), g}; }
+
+    // Makes `g` known in the tiles of some of its items.
+    void enter(uint32_t g, std::span<const uint32_t> items) {
+        for (const uint32_t item : items)
+            if (auto& near = in_tile_[tile_of_item_[item]]; near.empty() || near.back() != g) near.push_back(g);
     }
 
     // The group with which joining saves most.
@@ -94,15 +97,18 @@ class Merger {
                bytes_.of(receivers, contributions);
     }
 
+    // The smaller one's items go to the larger one, whose own are not touched: it may have millions.
     void merge(uint32_t g, uint32_t other) {
-        Group& a = groups_[g];
-        Group& b = groups_[other];
-        waiting_.erase({b.items.size(), b.items.front(), other});
-        Group joined{unionOf(a.contributions, b.contributions), a.page, {}};
-        std::ranges::merge(a.items, b.items, std::back_inserter(joined.items));
-        a = b = {};
-        groups_.push_back(std::move(joined));
-        enter(static_cast<uint32_t>(groups_.size()) - 1);
+        waiting_.erase(waitingOf(other));
+        const auto [from, to] =
+            groups_[g].items.size() > groups_[other].items.size() ? std::pair(other, g) : std::pair(g, other);
+        Group& small = groups_[from];
+        Group& large = groups_[to];
+        large.contributions = unionOf(large.contributions, small.contributions);
+        enter(to, small.items);
+        large.items.insert(large.items.end(), small.items.begin(), small.items.end());
+        small = {};
+        waiting_.insert(waitingOf(to));
     }
 
     // Joined lists may be those of groups in other tiles.
@@ -121,7 +127,7 @@ class Merger {
         return found;
     }
 
-    std::vector<Group> groups_;  // those that were joined are empty
+    std::vector<Group> groups_;  // those that went to others are empty; items in any order
     std::span<const uint64_t> tile_of_item_;
     GroupBytes bytes_;
     size_t contributions_max_;
