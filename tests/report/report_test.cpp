@@ -172,6 +172,7 @@ TEST(Report, PicturesShowRegionsAndOverlaps) {
             overlap[texel] = cluster.term_count;
             for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
                 const Contribution& c = data.contributions[data.terms[t].contribution];
+                if (data.payload[data.terms[t].first_record + i].irradiance == 0) continue;  // no light, no region
                 if (c.light_set) regions[*c.light_set].insert(texel);
                 for (const uint32_t door : c.doors_open) regions[door].insert(texel);
                 for (const uint32_t door : c.doors_closed) regions[door].insert(texel);
