@@ -229,7 +229,8 @@ void addInspectCommand(CLI::App& app, int& exit_code) {
     c->footer(
         "Sizes are in bytes (kB and MB: 1000 and 1000000 of them); energy dropped is the share of a light's energy "
         "that\n"
-        "fell below the threshold and is not stored; overlap is the number of contributions stored at a texel.\n"
+        "fell below the threshold and is not stored; overlap is the number of contributions stored at a texel, those\n"
+        "without light there included that a neighbour in its cluster has.\n"
         "Example: dimmer inspect house.dimmer --json house.json");
     c->callback([a, c, &exit_code] {
         if (c->count("--json") > 0 && a->json.empty()) a->json = "-";

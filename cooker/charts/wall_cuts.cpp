@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <span>
@@ -152,6 +153,7 @@ class WallCutter {
             if (a.forward) continue;
             // A solid between a's front, looking back, and b's, looking forward.
             for (const Trace& b : near(traces, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
+                if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
                 const float from = std::max(a.from, b.from), to = std::min(a.to, b.to);
                 if (to - from > same_line_m) cuts.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
             }
@@ -161,10 +163,14 @@ class WallCutter {
 
     static std::tuple<int, bool, float> placeOf(const Trace& t) { return {t.axis, t.forward, t.at}; }
 
-    // Of traces in the order of placeOf.
+    // What sums with a coordinate lose to rounding, and more.
+    static float slackAt(float at) { return 4 * std::numeric_limits<float>::epsilon() * std::abs(at); }
+
+    // Of traces in the order of placeOf, those between two places and perhaps a few more.
     static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high) {
-        const auto first = std::ranges::lower_bound(sorted, std::tuple(axis, forward, low), {}, placeOf);
-        return {first, std::ranges::upper_bound(first, sorted.end(), std::tuple(axis, forward, high), {}, placeOf)};
+        const auto first = std::ranges::lower_bound(sorted, std::tuple(axis, forward, low - slackAt(low)), {}, placeOf);
+        return {first, std::ranges::upper_bound(first, sorted.end(), std::tuple(axis, forward, high + slackAt(high)),
+                                                {}, placeOf)};
     }
 
     // What is there at both heights.
@@ -173,6 +179,7 @@ class WallCutter {
         std::vector<Trace> both;
         for (const Trace& a : low)
             for (const Trace& b : near(high, a.axis, a.forward, a.at - same_line_m, a.at + same_line_m)) {
+                if (std::abs(a.at - b.at) > same_line_m) continue;
                 const Trace t{a.axis, a.at, std::max(a.from, b.from), std::min(a.to, b.to), a.forward};
                 if (t.to - t.from > same_line_m) both.push_back(t);
             }
@@ -263,8 +270,9 @@ class WallCutter {
     static float wallLength(const Cut& cut, const std::vector<Cut>& cuts, float low, float high) {
         float whole = 0, first = high, last = low;
         const auto place = [](const Cut& c) { return std::pair(c.axis, c.at); };
-        auto it = std::ranges::lower_bound(cuts, std::pair(cut.axis, cut.at - same_line_m), {}, place);
-        for (; it != cuts.end() && it->axis == cut.axis && it->at < cut.at + same_line_m; ++it) {
+        const float reach_m = same_line_m + slackAt(cut.at);
+        auto it = std::ranges::lower_bound(cuts, std::pair(cut.axis, cut.at - reach_m), {}, place);
+        for (; it != cuts.end() && it->axis == cut.axis && it->at <= cut.at + reach_m; ++it) {
             const float from = std::max(it->from, low), to = std::min(it->to, high);
             if (std::abs(it->at - cut.at) >= same_line_m || from >= to) continue;
             whole += to - from;
@@ -274,18 +282,15 @@ class WallCutter {
         return wall_share_min * (last - first) < whole ? whole : std::min(cut.to, high) - std::max(cut.from, low);
     }
 
-    // Those that stand on a rectangle, or on the line of one that does.
-    static std::vector<Cut> cutsOn(const std::vector<Cut>& cuts, glm::vec2 low, glm::vec2 high) {
+    // Those on lines through a rectangle, all of each line.
+    static std::vector<Cut> cutsThrough(const std::vector<Cut>& cuts, glm::vec2 low, glm::vec2 high) {
         std::vector<Cut> found;
-        std::ranges::copy_if(cuts, std::back_inserter(found), [&](const Cut& c) {
-            const int along = 1 - c.axis;
-            return c.at > low[c.axis] - same_line_m && c.at < high[c.axis] + same_line_m && c.from < high[along] &&
-                   c.to > low[along];
-        });
+        std::ranges::copy_if(cuts, std::back_inserter(found),
+                             [&](const Cut& c) { return c.at >= low[c.axis] && c.at <= high[c.axis]; });
         return found;
     }
 
-    // What is left of a chart beside the walls so far, and the walls that stand on it.
+    // What is left of a chart beside the walls so far, and the walls that may stand on it.
     struct Part {
         std::vector<Piece> pieces;
         std::vector<Cut> cuts;
@@ -293,7 +298,7 @@ class WallCutter {
         Part(std::vector<Piece> of, const std::vector<Cut>& all_cuts) : pieces(std::move(of)) {
             for (const Piece& p : pieces)
                 for (glm::vec2 c : p.corners) low = glm::min(low, c), high = glm::max(high, c);
-            cuts = cutsOn(all_cuts, low, high);
+            cuts = cutsThrough(all_cuts, low, high);
         }
     };
 

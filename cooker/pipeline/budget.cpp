@@ -66,6 +66,7 @@ PackCost costOf(const PackData& pack) {
     const DeviceBytes bytes = deviceBytesOf(pack);
     cost.base_lightmap = bytes.base_lightmap;
     cost.dynamic = bytes.dynamic;
+    cost.probe_records = (pack.probes.payload.size() + pack.probes.numbers.size()) * sizeof(ProbeRecord);
     const GlobalGrid& grid = pack.probes.global;
     cost.global_grid = grid.positions.size() * sizeof(ProbeRecord) + gridTableBytes(grid);
     cost.local_grids = (pack.probes.base.size() - grid.positions.size()) * sizeof(ProbeRecord);

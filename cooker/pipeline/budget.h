@@ -21,6 +21,7 @@ struct ElementCost {
 struct PackCost {
     uint64_t base_lightmap = 0;  // the page images
     uint64_t dynamic = 0;        // records of every contribution, and the base of the receivers that they touch
+    uint64_t probe_records = 0;  // of which probes'
     uint64_t global_grid = 0;    // its probes as they stand with all sets off, and the tables to find them by
     uint64_t local_grids = 0;    // the probes of models as they stand with all sets off
     uint64_t ancillary = 0;      // addresses, weights and the work lists of the largest update

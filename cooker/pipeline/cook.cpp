@@ -79,8 +79,10 @@ Expected<void> writePack(const CookOptions& options, std::span<const std::byte> 
                          std::vector<std::string>& warnings) {
     auto written = writeFileAtomically(options.pack, bytes);
     std::error_code unknown;
-    const auto space = std::filesystem::space(std::filesystem::absolute(options.pack).parent_path(), unknown);
-    if (written || unknown || space.available >= bytes.size() || !cache || !cache->removeKept()) return written;
+    const auto folder = std::filesystem::absolute(options.pack).parent_path();
+    const auto space = std::filesystem::space(folder, unknown);
+    if (written || unknown || space.available >= bytes.size() || !cache) return written;
+    if (!cache->removeKeptFor(folder, bytes.size() - space.available)) return written;
     written = writeFileAtomically(options.pack, bytes);
     if (written)
         warnings.push_back(

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <sys/stat.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -284,9 +285,19 @@ void CookCache::finish(uint64_t bytes_max) {
                         store_.folder().string(), lost, humanBytes(bytes_max)));
 }
 
-bool CookCache::removeKept() {
-    for (const std::string& name : kept_) store_.remove(name);
-    return !std::exchange(kept_, {}).empty();
+bool CookCache::removeKeptFor(const std::filesystem::path& folder, uint64_t bytes) {
+    struct stat here {
+    }, there{};
+    if (stat(store_.folder().c_str(), &here) != 0 || stat(folder.c_str(), &there) != 0 || here.st_dev != there.st_dev)
+        return false;
+    uint64_t kept = 0;
+    constexpr uint64_t block_bytes = 512;  // of st_blocks
+    for (const std::string& name : kept_)
+        if (struct stat file{}; stat((store_.folder() / name).c_str(), &file) == 0)
+            kept += block_bytes * static_cast<uint64_t>(file.st_blocks);
+    if (kept < bytes) return false;
+    for (const std::string& name : std::exchange(kept_, {})) store_.remove(name);
+    return true;
 }
 
 std::string describeGroup(const Scene& scene, uint32_t group) {

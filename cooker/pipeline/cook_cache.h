@@ -63,8 +63,9 @@ class CookCache {
     // very cook used.
     void finish(uint64_t bytes_max);
 
-    // Takes back what this cook has kept. False: that is nothing.
-    bool removeKept();
+    // Takes back what this cook has kept where that gives so many bytes back to the disk of `folder`. False: it does
+    // not, and nothing was removed.
+    bool removeKeptFor(const std::filesystem::path& folder, uint64_t bytes);
 
     const std::vector<CacheLine>& lines() const { return lines_; }
     // What did not work; the cook goes on without.

@@ -172,7 +172,7 @@ Explanation explainSurface(const Pack& pack, const CpuRuntime& runtime, const Su
         for (const NearTexel& texel : near)
             if (const auto record = recordOf(d.texelView(), texel.place, texel.receiver, k)) {
                 scratch.put(texel.texel, d.payload[*record]);
-                c.records += &texel == &own;
+                c.records += &texel == &own && d.payload[*record].irradiance != 0;
             }
         c.full_lux = scratch.sampleAndClear(page, surface.uv, n);
         c.lux = scaled(c.full_lux, c.weight);
@@ -227,7 +227,7 @@ Explanation explainAir(const Pack& pack, const CpuRuntime& runtime, glm::vec3 po
         for (size_t i = 0; i < e.probes.size(); ++i) {
             const auto record = recordOf(probes.view(), e.probes[i].receiver, receivers[i], k);
             put(e.probes[i].number, record ? probes.payload[*record] : ProbeRecord{});
-            c.records += record.has_value();
+            c.records += record && probes.payload[*record].light != 0;
         }
         c.full_lux = luxAt(pack, scratch, point_m, normal);
         c.lux = scaled(c.full_lux, c.weight);

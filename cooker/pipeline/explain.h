@@ -20,8 +20,8 @@ struct ExplainedContribution {
     std::array<float, 3> full_lux{};  // at weight 1
     std::array<float, 3> lux{};       // at its weight
     double share = 0;                 // of the sum of all luminances, 0..1
-    // At the place: at the texel itself (without one, all light is a neighbour's, by filtering, or none), or at the
-    // probes around.
+    // With light at the place: at the texel itself (without one, all light is a neighbour's, by filtering, or none), or
+    // at the probes around.
     uint32_t records = 0;
 };
 

@@ -19,7 +19,7 @@ constexpr double density_margin = 0.92, probes_margin = 0.97;
 constexpr uint32_t local_probes_least = 8;  // a gradient along each axis
 constexpr double density_factor_max = 16;   // coarser pages are none
 constexpr int density_steps_max = 14;       // of halving: to a thousandth
-constexpr double error_max = 1;             // what costs more light than there is mends nothing
+constexpr double error_max = 1;             // of thresholds: what costs more light than there is mends nothing
 
 // One budget that is set: what it would hold at some rungs.
 struct Limit {
@@ -46,12 +46,6 @@ uint64_t scaled(uint64_t bytes, double share) {
 
 RecordBytes recordsNow(const LossTable& losses) {
     return losses.bytes(Rungs(losses.groupCount(), 0));
-}
-
-// Bytes of PackCost::dynamic that are not texels'. They are not in the table of losses: thresholds are taken to drop as
-// large a share of them.
-uint64_t probeRecords(const PackCost& cost, const LossTable& losses) {
-    return cost.dynamic - std::min(cost.dynamic, recordsNow(losses).dynamic);
 }
 
 // Of all bytes of texels' records, the share that stays; what says where records belong goes with them.
@@ -194,8 +188,8 @@ struct Share {
     }
 };
 
-std::vector<Share> sharesOver(const PackCost& cost, const Profile& profile, const LossTable& losses) {
-    const uint64_t of_probes = probeRecords(cost, losses), of_texels = cost.dynamic - of_probes;
+std::vector<Share> sharesOver(const PackCost& cost, const Profile& profile) {
+    const uint64_t of_probes = cost.probe_records, of_texels = cost.dynamic - of_probes;
     std::vector<Share> shares = {
         {profile.budget_total, cost.base_lightmap, of_texels + cost.ancillary,
          cost.global_grid + cost.local_grids + of_probes},
@@ -213,13 +207,13 @@ bool baseIsOver(const PackCost& cost, const Profile& profile) {
 }
 
 bool pagesOrRecordsAreOver(const PackCost& cost, const Profile& profile) {
-    return !sharesOver(cost, profile, {}).empty();
+    return !sharesOver(cost, profile).empty();
 }
 
 // Saves nothing where no budget that it helps with is exceeded.
 Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& losses, size_t steps_before) {
     Remedy remedy;
-    const std::vector<Share> over = sharesOver(cost, profile, losses);
+    const std::vector<Share> over = sharesOver(cost, profile);
     if (over.empty()) return remedy;
     // Where two steps fell short already, go further than it takes.
     const double power = 1 + 0.5 * static_cast<double>(std::max<size_t>(steps_before, 1) - 1);
@@ -242,7 +236,7 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
     remedy.changes.push_back({density_key, from, to});
     remedy.error = losses.densityError(factor);
     remedy.saves = scaled(cost.base_lightmap, std::max(0.0, 1 - left.pages)) +
-                   scaled(cost.dynamic - probeRecords(cost, losses) + cost.ancillary, 1 - left.charts);
+                   scaled(cost.dynamic - cost.probe_records + cost.ancillary, 1 - left.charts);
     return remedy;
 }
 
@@ -267,11 +261,11 @@ Remedy withProbes(const PackData& pack, const PackCost& cost, const Profile& pro
 
 // Saves nothing where the grid is not the trouble. Where the total asks for more probes than can go, its excess is left
 // to others.
-Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
+Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile) {
     const double for_grid = gridIsOver(cost, profile) ? ratio(profile.budget_global_grid, cost.global_grid) : 1.0;
     double for_total = 1;
     if (profile.budget_total > 0 && cost.device() > profile.budget_total)
-        for_total -= ratio(cost.device() - profile.budget_total, cost.global_grid + probeRecords(cost, losses));
+        for_total -= ratio(cost.device() - profile.budget_total, cost.global_grid + cost.probe_records);
     Profile others = profile;
     others.budget_total = others.budget_global_grid = 0;
     Remedy remedy = withProbes(pack, cost, profile, std::min(for_grid, for_total));
@@ -335,7 +329,7 @@ uint32_t largestSet(const PackData& pack, const PackCost& cost) {
 bool mayFit(const PackData& pack, PackCost cost, Profile profile, const LossTable& losses, bool without_grids) {
     const LossTable::TexelsLeft left = losses.texelsLeft(density_factor_max);
     if (without_grids) {
-        cost.dynamic -= probeRecords(cost, losses);
+        cost.dynamic -= std::exchange(cost.probe_records, 0);
         cost.global_grid = cost.local_grids = 0;
         for (ElementCost& e : cost.elements) e.bytes -= std::exchange(e.probe_bytes, 0);
     }
@@ -373,7 +367,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
         found.push_back(std::move(remedy));
     };
     add(byDensity(cost, profile, losses, 0));
-    add(byProbes(pack, cost, profile, losses));
+    add(byProbes(pack, cost, profile));
     add(byAll(pack, cost, profile, losses, 0));
     add(byLocalProbes(pack, cost, profile));
     if (!baseIsOver(cost, profile) && exceeded(losses, limits, Rungs(losses.groupCount(), 0))) {
@@ -392,7 +386,7 @@ Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& 
                      size_t density_steps) {
     if (!mayFit(pack, cost, profile, losses, true)) return {};
     const auto limits = limitsOf(pack, cost, profile, losses);
-    if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile, losses);
+    if (gridIsOver(cost, profile)) return byProbes(pack, cost, profile);
     if (localGridsAreOver(cost, profile)) return byLocalProbes(pack, cost, profile);
     if (!baseIsOver(cost, profile)) {
         Remedy thresholds = byRungs(pack, cost, profile, losses, limits, greedy(losses, limits));
@@ -402,8 +396,7 @@ Remedy fittingRemedy(const PackData& pack, const PackCost& cost, const Profile& 
     const bool takes_probes = !remedy.changes.empty();
     if (!takes_probes) remedy = byDensity(cost, profile, losses, density_steps);
     if (!remedy.fits)
-        if (Remedy probes = byProbes(pack, cost, profile, losses); probes.fits && !probes.changes.empty())
-            return probes;
+        if (Remedy probes = byProbes(pack, cost, profile); probes.fits && !probes.changes.empty()) return probes;
     return takes_probes || mayFit(pack, cost, profile, losses, false) ? remedy : Remedy{};
 }
 

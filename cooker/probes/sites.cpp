@@ -442,7 +442,7 @@ void SiteLight::share(std::span<Row> rows, std::span<const size_t> blocks, std::
             std::ranges::sort(here[i], {}, [&](const auto& of) { return std::pair(groupOf(of), of.term); });
         });
         for (const uint32_t g : groups) light_[g][b] = ofGroup(here, g);
-        for (Row& row : here) row = {};
+        for (Row& row : here) row = Row();  // {} would keep the memory
     }
     for (const uint32_t g : groups)
         if (store_) store_->keepSites(g, blocks_, light_[g], blocks);

@@ -93,12 +93,15 @@ TEST(FitLimits, RecordsOfProbesGoWithThem) {
     PackCost cost;
     cost.base_lightmap = 20000;
     cost.global_grid = 80000;
-    cost.dynamic = 100000;
+    cost.dynamic = cost.probe_records = 100000;
     Profile profile;
     profile.budget_total = 60000;
     const Remedy remedy = fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true));
     ASSERT_FALSE(remedy.changes.empty());
     EXPECT_EQ(remedy.changes.back().key, "grids.probes_max");
+    // Texels' records are no probes', with light or without.
+    cost.probe_records = 0;
+    EXPECT_TRUE(fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true)).changes.empty());
 }
 
 // No grid of a model has less than 8 probes: one round finds that out, and its figures are not those of the settings
