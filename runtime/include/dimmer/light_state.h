@@ -75,7 +75,8 @@ class LightState {
     // A thing that moves gets probes of its own, as many as its grid says, taken from the level's global grid by the
     // next update, and again whenever it moved or the light around it changed. Refused, with nothing changed: a grid or
     // transform that is not finite, a singular transform; Unsupported where the pack has no global grid; OutOfMemory
-    // where no free range of moving_probes_max is long enough for its probes, in multiples of 8. Constant time but for the number of models.
+    // where no free range of moving_probes_max is long enough for its probes, in multiples of 8. Constant time but for
+    // the number of models.
     Expected<Model> addModel(const ModelGrid& grid, const Transform& transform);
     Expected<void> moveModel(Model model, const Transform& transform);
     Expected<void> removeModel(Model model);

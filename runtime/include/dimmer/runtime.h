@@ -52,8 +52,9 @@ struct RuntimeOptions {
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
     // always-on light that doors let through is loaded in any case.
     bool load_records = true;
-    // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; each model takes
-    // a multiple of 8 of them in a row. 0, or a pack without a global light grid: no models, and nothing is kept for them.
+    // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; each model
+    // takes a multiple of 8 of them in a row. 0, or a pack without a global light grid: no models, and nothing is kept
+    // for them.
     uint32_t moving_probes_max = 0;
     // Write GPU timestamps around each update, read by wait(). Off costs nothing.
     bool timestamps = true;
