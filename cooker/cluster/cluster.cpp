@@ -1,6 +1,6 @@
 #include <cluster/cluster.h>
 
-#include <cluster/merge.h>
+#include <cluster/texel_groups.h>
 #include <encode/encode.h>
 #include <encode/encode_probe.h>
 #include <pack/batches.h>
@@ -18,56 +18,20 @@
 namespace dimmer::cook {
 namespace {
 
-// A texel of a page, whether baked or a copy.
-struct Target {
-    uint64_t order;  // page, tile row, tile column, then inside the tile
-    uint32_t address;
-    uint32_t source;  // receiver whose light it shows
-};
-
-uint64_t tileOrder(uint32_t address) {
-    const uint64_t x = TexelAddress::x(address), y = TexelAddress::y(address);
-    return uint64_t{TexelAddress::page(address)} << 32 | (y >> 3) << 20 | (x >> 3) << 8 | (y & 7) << 3 | (x & 7);
-}
-
-std::vector<Target> listTargets(const Texels& texels) {
-    std::vector<Target> targets;
-    targets.reserve(texels.size() + texels.fills.size());
-    for (uint32_t i = 0; i < texels.size(); ++i)
-        targets.push_back({tileOrder(texels.address[i]), texels.address[i], i});
-    for (const FillTexel& f : texels.fills) targets.push_back({tileOrder(f.address), f.address, f.source});
-    std::ranges::sort(targets, {}, &Target::order);
-    return targets;
-}
-
 size_t pageIndex(const PackData& pack, uint32_t address) {
     return (size_t{TexelAddress::page(address)} * pack.page_height + TexelAddress::y(address)) * pack.page_width +
            TexelAddress::x(address);
 }
 
-// Items (texels or probes, in the order that clusters keep) by the contributions that their light has, and by page.
-class Grouping {
-   public:
-    template <class Light>
-    void add(uint32_t item, uint32_t page, std::span<const LightOfTerm<Light>> light,
-             std::span<const uint32_t> contribution_of_term) {
-        signature_ = {{}, page};
-        for (const auto& l : light)
-            if (l.term != always_group) signature_.first.push_back(contribution_of_term[l.term]);
-        if (!signature_.first.empty()) members_[signature_].push_back(item);
-    }
-
-    std::vector<Group> groups() && {
-        std::vector<Group> all;
-        for (auto& [signature, items] : members_) all.push_back({signature.first, signature.second, std::move(items)});
-        return all;
-    }
-
-   private:
-    using Signature = std::pair<std::vector<uint32_t>, uint32_t>;  // contributions and page
-    std::map<Signature, std::vector<uint32_t>> members_;           // -> items
-    Signature signature_;
-};
+// Contributions of a row of light, ascending.
+template <class Light>
+std::vector<uint32_t> contributionsOf(std::span<const LightOfTerm<Light>> light,
+                                      std::span<const uint32_t> contribution_of_term) {
+    std::vector<uint32_t> list;
+    for (const auto& l : light)
+        if (l.term != always_group) list.push_back(contribution_of_term[l.term]);
+    return list;
+}
 
 // Clusters by their number of contributions, as updates take them, and in their items' order among equals: what a
 // dispatch reads lies together, and neighbours in the file are neighbours on the page.
@@ -159,23 +123,20 @@ std::vector<uint64_t> probeTiles(std::span<const ProbePosition> positions, size_
 
 void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
                    uint32_t overlap_max, PackData& pack) {
-    const std::vector<Target> targets = listTargets(texels);
+    const std::vector<ShownTexel> targets = listTexels(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
-    Grouping grouping;
-    for (uint32_t t = 0; t < targets.size(); ++t)
-        grouping.add(t, TexelAddress::page(targets[t].address), baked.light.row(targets[t].source),
-                     contribution_of_term);
     tbb::parallel_for(size_t{0}, targets.size(), [&](size_t t) {
         for (const ReceiverLight& l : baked.light.row(targets[t].source))
             if (l.term == always_group)
                 pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
     });
-    std::vector<uint64_t> tiles;
-    for (const Target& target : targets) tiles.push_back(target.order >> 8);
+    const auto listOf = [&](uint32_t receiver) {
+        return contributionsOf(baked.light.row(receiver), contribution_of_term);
+    };
     const auto counts = fillTables<TexelRecord>(
-        ordered(mergeGroups(std::move(grouping).groups(), tiles, texel_group_bytes, overlap_max)), contribution_of_term,
-        pack.contributions.size(), {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
+        ordered(groupTexels(targets, listOf, overlap_max)), contribution_of_term, pack.contributions.size(),
+        {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
         [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
@@ -191,7 +152,7 @@ void buildProbeClusters(const Baked& baked, std::span<const uint32_t> contributi
     const ProbeEncoding encoding{pack.exposure, pack.color_format};
     probes.base.assign(all, encodeProbe({}, encoding));
     Grouping grouping;
-    for (uint32_t i = 0; i < all; ++i) grouping.add(i, 0, row(i), contribution_of_term);
+    for (uint32_t i = 0; i < all; ++i) grouping.add(i, 0, contributionsOf(row(i), contribution_of_term));
     tbb::parallel_for(size_t{0}, all, [&](size_t i) {
         for (const ProbeTermLight& l : row(i))
             if (l.term == always_group) probes.base[i] = encodeProbe(l.light, encoding);

@@ -115,7 +115,9 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                const std::vector<Limit>& limits, const Rungs& rungs) {
     Remedy remedy;
     const Loss loss = losses.loss(rungs);
-    remedy.saves = scaled(cost.dynamic, std::max(0.0, 1 - recordsLeft(recordsNow(losses), losses.bytes(rungs))));
+    const uint64_t now = losses.storedBytes(Rungs(losses.groupCount(), 0)), then = losses.storedBytes(rungs);
+    remedy.saves = now - std::min(now, then) +
+                   scaled(cost.probe_records, std::max(0.0, 1 - recordsLeft(recordsNow(losses), losses.bytes(rungs))));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
     remedy.fits =

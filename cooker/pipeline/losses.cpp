@@ -82,6 +82,7 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
     : terms_(baked.terms),
       overlap_max_(overlap_max == 0 ? UINT32_MAX : overlap_max),
       copies_(copiesOf(texels)),
+      shown_(listTexels(texels)),
       sizes_(std::move(sizes)) {
     uint64_t fixed = 0, all = 0;
     for (size_t i = 0; i < sizes_.charts.size(); ++i) {
@@ -231,6 +232,18 @@ RecordBytes LossTable::bytes(const Rungs& rungs) const {
             for (const uint32_t door : *list) sum.by_door[door] += bytes;
     });
     return sum;
+}
+
+uint64_t LossTable::storedBytes(const Rungs& rungs) const {
+    std::vector<std::vector<uint32_t>> terms(copies_.size());
+    forKept(rungs, [&](const Record& r, size_t) { terms[r.receiver].push_back(r.term); });
+    for (auto& list : terms) std::ranges::sort(list);
+    const uint32_t limit = isLimited() ? overlap_max_ : 0;
+    uint64_t records = 0;
+    for (const Group& group : groupTexels(
+             shown_, [&](uint32_t receiver) { return terms[receiver]; }, limit))
+        records += group.items.size() * (group.contributions.size() + 1);  // with the receivers' base
+    return records * sizeof(TexelRecord);
 }
 
 LossSteps::LossSteps(uint32_t groups, uint32_t doors) : steps_(groups) {

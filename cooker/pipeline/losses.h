@@ -3,6 +3,7 @@
 
 #include <bake/bake.h>
 #include <charts/texels.h>
+#include <cluster/texel_groups.h>
 
 #include <array>
 #include <cstdint>
@@ -69,8 +70,11 @@ class LossTable {
 
     // From the present thresholds to `rungs`.
     Loss loss(const Rungs& rungs) const;
-    // At `rungs`. Exact.
+    // At `rungs`, of records that have light. Exact.
     RecordBytes bytes(const Rungs& rungs) const;
+    // Of all, with those without light of clusters that join others. Exact, but for values that rounding puts on the
+    // threshold itself. Cost: clusters all texels.
+    uint64_t storedBytes(const Rungs& rungs) const;
     // To choose by at `rungs`.
     LossSteps steps(const Rungs& rungs) const;
     // Whether receivers hold only so many records: then steps() at other rungs are others.
@@ -112,6 +116,7 @@ class LossTable {
     uint32_t overlap_max_ = UINT32_MAX;
     std::vector<Record> records_;   // by receiver, the brightest first
     std::vector<uint32_t> copies_;  // texels that show a receiver
+    std::vector<ShownTexel> shown_;
     double curvature_ = 0;
     ChartSizes sizes_;
     double fixed_texels_ = 0;  // share of charts' texels

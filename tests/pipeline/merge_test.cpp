@@ -16,7 +16,7 @@ std::vector<uint32_t> counting(uint32_t first, uint32_t count) {
     return list;
 }
 
-// On the device: 8 bytes a record (in pairs; the base is one) and 16 a term of the largest work list, by runtime.md.
+// On the device: 8 bytes a record (in pairs; the base is one) and 16 a term of the largest work list.
 size_t deviceBytes(const std::vector<Group>& groups) {
     size_t bytes = 0;
     for (const Group& g : groups)
