@@ -123,21 +123,21 @@ std::vector<uint64_t> probeTiles(std::span<const ProbePosition> positions, size_
 
 void buildClusters(const Texels& texels, const Baked& baked, std::span<const uint32_t> contribution_of_term,
                    uint32_t overlap_max, PackData& pack) {
-    const std::vector<ShownTexel> targets = listTexels(texels);
+    const std::vector<ShownTexel> shown = listTexels(texels);
     const TexelEncoding encoding{pack.exposure, pack.color_format, pack.direction_model};
     pack.base_pages.assign(size_t{pack.page_count} * pack.page_height * pack.page_width, encodeTexel({}, encoding));
-    tbb::parallel_for(size_t{0}, targets.size(), [&](size_t t) {
-        for (const ReceiverLight& l : baked.light.row(targets[t].source))
+    tbb::parallel_for(size_t{0}, shown.size(), [&](size_t t) {
+        for (const ReceiverLight& l : baked.light.row(shown[t].source))
             if (l.term == always_group)
-                pack.base_pages[pageIndex(pack, targets[t].address)] = encodeTexel(l.light, encoding);
+                pack.base_pages[pageIndex(pack, shown[t].address)] = encodeTexel(l.light, encoding);
     });
     const auto listOf = [&](uint32_t receiver) {
         return contributionsOf(baked.light.row(receiver), contribution_of_term);
     };
     const auto counts = fillTables<TexelRecord>(
-        ordered(groupTexels(targets, listOf, overlap_max)), contribution_of_term, pack.contributions.size(),
+        ordered(groupTexels(shown, listOf, overlap_max)), contribution_of_term, pack.contributions.size(),
         {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
-        [&](uint32_t t) { return targets[t].address; }, [&](uint32_t t) { return baked.light.row(targets[t].source); },
+        [&](uint32_t t) { return shown[t].address; }, [&](uint32_t t) { return baked.light.row(shown[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
         [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
     for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
