@@ -12,10 +12,12 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs/measurements.md"
 OUT = ROOT / "out/bench"
 MODES = ["worklist", "per-combination", "gather", "scatter", "cpu"]
-ESTATE = [(f"estate, {n:,} clusters", f"estate_{n}", ["--like", "estate", "--clusters", str(n)])
-          for n in (100, 1000, 10000)]
-OTHERS = [(name, name, ["--like", name]) for name in ("consulate", "townhoused", "safehouse", "yard")] + [
-    ("estate, 1,000 clusters, with probes", "estate_probes", ["--like", "estate", "--clusters", "1000", "--probes"])]
+LEVELS = [(f"{name}, {n:,} clusters", f"{name}_{n}", ["--like", name, "--clusters", str(n)])
+          for name in ("estate", "consulate", "townhoused", "safehouse", "yard") for n in (100, 1000, 10000)]
+ESTATE = LEVELS[1]
+PROBES = ("estate, 1,000 clusters, with probes", "estate_probes",
+          ["--like", "estate", "--clusters", "1000", "--probes"])
+FLICKER_FRAMES = 1000
 GROWTH = [("estate, 1,000 clusters", "estate_1000", ["--like", "estate", "--clusters", "1000"])] + [
     (f"{n} x the receivers and clusters", f"estate_x{n}",
      ["--like", "estate", "--scale", str(n), "--clusters", str(1000 * n)]) for n in (2, 4, 8)] + [
@@ -23,11 +25,10 @@ GROWTH = [("estate, 1,000 clusters", "estate_1000", ["--like", "estate", "--clus
 
 
 def measure(name, synth, frames, *options):
-    """Makes the pack where it is missing, measures it and returns the cases."""
+    """Makes the pack, measures it and returns the cases."""
     tool = [os.path.join(os.environ.get("DIMMER_BIN", "build/bin"), "dimmer")]
     pack = OUT / f"{name}.dimmer"
-    if not pack.exists():
-        subprocess.run(tool + ["synth", *synth, "-o", pack], check=True)
+    subprocess.run(tool + ["synth", *synth, "-o", pack], check=True)
     figures = OUT / f"{name}.json"
     subprocess.run(tool + ["bench", pack, "--frames", str(frames), "--json", figures, "--plot", OUT / f"{name}.svg",
                            *options], check=True)
@@ -52,8 +53,10 @@ def modes_table(levels, frames):
         by_mode = {case["mode"]: case for case in report["cases"]}
         work = by_mode["worklist"]
         rows.append([label, f"{work['receivers'] / 1e6:.2f}"] + [f"{cost(report, by_mode[m]):.1f}" for m in MODES] +
-                    [f"{work['efficiency']:.2f}", f"{work['efficiency_pages']:.2f}"])
-    return table(["level", "M receivers", *MODES, "roof / worklist", "pages' roof / worklist"], rows)
+                    [f"{cost(report, by_mode['per-combination']) / cost(report, work):.1f}",
+                     f"{work['efficiency']:.2f}", f"{work['efficiency_pages']:.2f}"])
+    return table(["level", "M receivers", *MODES, "per-combination / worklist", "roof / worklist",
+                  "pages' roof / worklist"], rows)
 
 
 def growth_table(frames):
@@ -67,11 +70,26 @@ def growth_table(frames):
     return table(["pack", "M texels active", "ms", "times the first", "host us"], rows)
 
 
+def toggles(report):
+    """Of the light sets that are toggled alone: the one with the fewest receivers, the middle one, and the most."""
+    sets = sorted((c for c in report["cases"] if c["name"].startswith("set ") and c["receivers"] > 0),
+                  key=lambda c: c["receivers"])
+    return [sets[0], sets[len(sets) // 2], sets[-1]]
+
+
 def cases_table(frames):
-    report = measure("estate_1000", ESTATE[1][2], frames, "--mode", "worklist", "--only", "changed")
-    rows = [[case["name"], f"{case['receivers']:,}", f"{cost(report, case):.2f}",
-             f"{1e6 * cost(report, case) / case['receivers']:.1f}" if case["receivers"] else "-",
-             f"{case['host_us']['median']:.1f}"] for case in report["cases"]]
+    estate = measure(ESTATE[1], ESTATE[2], frames, "--mode", "worklist")
+    changed = [c for c in estate["cases"] if c["name"].endswith("changed")]
+    flicker = measure(ESTATE[1], ESTATE[2], FLICKER_FRAMES, "--mode", "worklist", "--only", "flicker")
+    doors = measure("townhoused", ["--like", "townhoused"], frames, "--mode", "worklist", "--only", "door ")
+    models = measure(PROBES[1], PROBES[2], frames, "--mode", "worklist", "--only", "models")
+    rows = []
+    for report, cases, of in ((estate, changed[:1] + toggles(estate) + changed[1:], ""),
+                              (flicker, flicker["cases"], f", {FLICKER_FRAMES:,} updates"),
+                              (doors, doors["cases"], ", townhoused"), (models, models["cases"], ", with probes")):
+        rows += [[case["name"] + of, f"{case['receivers']:,}", f"{cost(report, case):.2f}",
+                  f"{1e6 * cost(report, case) / case['receivers']:.1f}" if case["receivers"] else "-",
+                  f"{case['host_us']['median']:.1f}"] for case in cases]
     return table(["case", "receivers", "ms", "ns per receiver", "host us"], rows)
 
 
@@ -89,7 +107,7 @@ def main():
     parser.add_argument("--only", choices=["modes", "growth", "cases"], help="one part of it")
     options = parser.parse_args()
     OUT.mkdir(parents=True, exist_ok=True)
-    parts = {"modes": lambda: modes_table(ESTATE + OTHERS, options.frames),
+    parts = {"modes": lambda: modes_table(LEVELS + [PROBES], options.frames),
              "growth": lambda: growth_table(options.frames), "cases": lambda: cases_table(options.frames)}
     for name, part in parts.items():
         if options.only in (None, name):

@@ -5,6 +5,7 @@ layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const int loads = 3;        // of 16 bytes, per 16 bytes stored
 layout(constant_id = 2) const int lane_stores = 4;  // 16 bytes that a lane stores, one after another
 layout(constant_id = 3) const bool to_pages = false;
+layout(constant_id = 4) const bool one_stream = false;  // a unit's loads lie side by side, not in streams of their own
 
 layout(push_constant) uniform Copy {
     uint first, count;  // units of 16 bytes to store
@@ -40,7 +41,9 @@ void main() {
         uint unit = begin + uint(i) * 8u;
         if (unit >= copy.count) return;
         uvec4 value = uvec4(0);
-        for (int s = 0; s < loads; ++s) value ^= texelFetch(source, int(uint(s) * copy.stride + copy.first + unit));
+        uint begin_load = one_stream ? (copy.first + unit) * uint(loads) : copy.first + unit;
+        uint step = one_stream ? 1u : copy.stride;
+        for (int s = 0; s < loads; ++s) value ^= texelFetch(source, int(begin_load + uint(s) * step));
         store(copy.first + unit, value);
     }
 }

@@ -37,11 +37,13 @@ Spread spreadOf(std::vector<double> values);
 // Times in microseconds.
 struct CaseResult {
     std::string name, mode;
+    uint32_t sets = 0;    // BenchCase::sets
     UpdateStats largest;  // of the update that moved the most bytes
     Spread gpu_us;        // on the GPU's clock
     Spread host_us;       // of planning and recording
     // Of the whole process over the number of processors: on a Vulkan device that is a CPU, the time an update takes
-    // where nothing else runs, and steady where something does.
+    // where nothing else runs, and steady where something does. What one thread does alone, as planning, counts for a
+    // fraction of its time.
     Spread process_us;
     // Copies of as many bytes, on the clock that BenchReport::clock names: into a buffer, and into pages.
     std::optional<Spread> roof_us, roof_pages_us;

@@ -22,40 +22,45 @@ Expected<void> setElement(LightState& state, uint32_t index, float weight) {
 BenchCase toggle(const Pack& pack, uint32_t index) {
     const Element& element = pack.elements()[index];
     const float start = isSet(element) ? 1.0f : 0.0f;
-    return {fmt::format("{} {} toggled", isSet(element) ? "set" : "door", element.name),
-            [=](LightState& state, uint32_t frame) {
-                return setElement(state, index, frame % 2 == 0 ? 1 - start : start);
-            }};
+    return {
+        fmt::format("{} {} toggled", isSet(element) ? "set" : "door", element.name),
+        [=](LightState& state, uint32_t frame) { return setElement(state, index, frame % 2 == 0 ? 1 - start : start); },
+        isSet(element) ? 1u : 0u};
 }
 
 // The first `count` sets go to half of the range they surely have and back, so that every frame changes all of them.
 BenchCase changeSets(std::string name, uint32_t count) {
-    return {std::move(name), [count](LightState& state, uint32_t frame) -> Expected<void> {
+    return {std::move(name),
+            [count](LightState& state, uint32_t frame) -> Expected<void> {
                 for (uint32_t i = 0; i < count; ++i) {
                     const float full = std::min(1.0f, state.pack().elements()[i].max_weight);
                     if (auto ok = setElement(state, i, frame % 2 == 0 ? full / 2 : full); !ok) return ok;
                 }
                 return {};
-            }};
+            },
+            count};
 }
 
 // Five sets, spread over the list, at weights that differ from frame to frame.
 BenchCase flicker(uint32_t sets) {
-    return {"5 sets flicker", [sets](LightState& state, uint32_t frame) -> Expected<void> {
+    return {"5 sets flicker",
+            [sets](LightState& state, uint32_t frame) -> Expected<void> {
                 constexpr uint32_t flickering = 5, steps = 97;
                 for (uint32_t i = 0; i < flickering; ++i) {
                     const float weight = static_cast<float>((frame * 31 + i * 17 + 1) % steps) / steps;
                     if (auto ok = setElement(state, i * sets / flickering, weight); !ok) return ok;
                 }
                 return {};
-            }};
+            },
+            0};
 }
 
 // Models of 4 x 4 x 4 probes, each a step further every frame, from places spread over the grid's box.
 BenchCase moveModels(const Pack& pack) {
     auto models = std::make_shared<std::vector<Model>>();
     const StartGrid box = pack.data().probes.global.start;
-    return {fmt::format("{} models moved", bench_models), [=](LightState& state, uint32_t frame) -> Expected<void> {
+    return {fmt::format("{} models moved", bench_models),
+            [=](LightState& state, uint32_t frame) -> Expected<void> {
                 for (uint32_t i = 0; i < bench_models; ++i) {
                     Transform place;
                     for (size_t axis = 0; axis < 3; ++axis) {
@@ -73,14 +78,15 @@ BenchCase moveModels(const Pack& pack) {
                     models->push_back(*model);
                 }
                 return {};
-            }};
+            },
+            0};
 }
 
 }  // namespace
 
 std::vector<BenchCase> casesOf(const Pack& pack) {
     std::vector<BenchCase> cases;
-    cases.push_back({"nothing changed", [](LightState&, uint32_t) { return Expected<void>(); }});
+    cases.push_back({"nothing changed", [](LightState&, uint32_t) { return Expected<void>(); }, 0});
     const auto elements = pack.elements();
     for (uint32_t i = 0; i < elements.size(); ++i) cases.push_back(toggle(pack, i));
     // Light sets come before doors.

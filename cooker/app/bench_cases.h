@@ -13,6 +13,7 @@ struct BenchCase {
     std::string name;
     // Changes the state for a frame; frames are counted from 0.
     std::function<Expected<void>(LightState&, uint32_t frame)> change;
+    uint32_t sets = 0;  // light sets that every frame changes; 0 where that is not what the case is about
 };
 
 // Where the pack has a global grid the last case moves models, which stay: the runtime needs room for bench_probes.

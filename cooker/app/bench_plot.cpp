@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <iterator>
 
@@ -99,13 +98,6 @@ std::string diagram(const std::vector<Series>& all, std::string_view title, std:
     return svg;
 }
 
-// "16 sets changed": 16; 0 for other names.
-double setsChanged(const std::string& name) {
-    uint32_t count = 0;
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), count);
-    return error == std::errc() && std::string_view(end, name.data() + name.size()) == " sets changed" ? count : 0;
-}
-
 // cost(result) and x(result) of each mode's cases; points without both are left out.
 template <class X>
 std::vector<Series> seriesOf(const BenchReport& report, X x) {
@@ -126,7 +118,7 @@ std::vector<Series> seriesOf(const BenchReport& report, X x) {
 
 std::string plotSvg(const BenchReport& report) {
     const auto receivers = [](const CaseResult& r) { return static_cast<double>(r.largest.receivers); };
-    const auto sets = [](const CaseResult& r) { return setsChanged(r.name); };
+    const auto sets = [](const CaseResult& r) { return static_cast<double>(r.sets); };
     return fmt::format(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" font-family=\"sans-serif\" "
         "font-size=\"12\">\n<rect width=\"{0}\" height=\"{1}\" fill=\"white\"/>\n{2}{3}</svg>\n",

@@ -87,8 +87,10 @@ nlohmann::ordered_json fittedJson(const CookResult& result) {
         nlohmann::ordered_json changes;
         // The shortest decimal that reads back as the same float.
         for (const Change& c : remedy.changes) changes[c.key] = std::stod(fmt::format("{}", c.to));
-        list.push_back(
-            {{"changes", changes}, {"saves", remedy.saves}, {"error", std::stod(fmt::format("{:.4g}", remedy.error))}});
+        list.push_back({{"changes", changes},
+                        {"saves", remedy.saves},
+                        {"error", remedy.texels ? nlohmann::ordered_json(std::stod(fmt::format("{:.4g}", remedy.error)))
+                                                : nlohmann::ordered_json(nullptr)}});
     }
     return list;
 }

@@ -19,8 +19,10 @@ struct ReportArguments {
 };
 
 Expected<nlohmann::json> readJson(const std::string& file) {
+    std::error_code ignored;
     std::ifstream in(file);
-    if (!in) return fail(ErrorCode::Io, fmt::format("{}: it cannot be opened", file));
+    if (!in || !std::filesystem::is_regular_file(file, ignored))
+        return fail(ErrorCode::Io, fmt::format("{}: it cannot be opened", file));
     auto json = nlohmann::json::parse(in, nullptr, false);
     if (json.is_discarded()) return fail(ErrorCode::BadInput, fmt::format("{}: it is no JSON", file));
     return json;

@@ -5,7 +5,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 namespace dimmer::cook {
@@ -29,10 +31,16 @@ int run(SynthArguments& a) {
     if (!data) return reportError(data.error());
     const auto bytes = packBytes(*data);
     if (auto ok = writeFileAtomically(a.output, bytes); !ok) return reportError(ok.error());
-    fmt::print("{}: {} texels, {} of them in {} clusters, {} records ({:.3f} per texel), {} light sets, {} doors\n",
-               a.output, data->base_pages.size(), data->addresses.size(), data->clusters.size(), data->payload.size(),
-               static_cast<double>(data->payload.size()) / static_cast<double>(data->base_pages.size()),
-               data->elements.size() - a.options.level.doors, a.options.level.doors);
+    const auto sets = data->elements.size() - a.options.level.doors;
+    const auto lighting =
+        std::count_if(data->contributions.begin(), data->contributions.begin() + static_cast<std::ptrdiff_t>(sets),
+                      [](const Contribution& c) { return c.receivers > 0; });
+    fmt::print(
+        "{}: {} texels, {} of them in {} clusters, {} records ({:.3f} per texel), {} light sets ({} of them light "
+        "something), {} doors\n",
+        a.output, data->base_pages.size(), data->addresses.size(), data->clusters.size(), data->payload.size(),
+        static_cast<double>(data->payload.size()) / static_cast<double>(data->base_pages.size()), sets, lighting,
+        a.options.level.doors);
     return exit_done;
 }
 
@@ -48,6 +56,10 @@ void addSynthCommand(CLI::App& app, int& exit_code) {
     c->add_option("--scale", a->options.scale, "times the level's texels")->capture_default_str();
     c->add_option("--clusters", a->options.clusters, "distinct lists of contributions")->capture_default_str();
     c->add_option("--sets", a->options.light_sets, "light sets; 0: as many as the level")->capture_default_str();
+    c->add_option("--color", a->options.color_format, "of the records: e5b9g9r9 or r11g11b10f")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, ColorFormat>{
+            {"e5b9g9r9", ColorFormat::E5B9G9R9}, {"r11g11b10f", ColorFormat::R11G11B10F}}))
+        ->default_str("e5b9g9r9");
     c->add_flag("--probes", a->options.probes, "light probes as well, as many as the level has");
     c->add_option("--seed", a->options.seed, "of the random numbers")->capture_default_str();
     c->footer("Example: dimmer synth --like estate --clusters 1000 -o estate.dimmer");

@@ -103,9 +103,9 @@ struct FollowedLight {
     std::vector<uint32_t> bounces;  // per group
 };
 
-// Fills `baked` with the light of the groups whose turn it is. `rays`: may be null.
-FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings, const Turns& turns, Progress& progress,
-                         RememberedRays* rays, Baked& baked) {
+// Fills `baked` with the light of the groups whose turn it is, as it arrives. `rays`: may be null.
+Series gatherGroups(const Gatherer& gatherer, const BakeSettings& settings, const Turns& turns, Progress& progress,
+                    RememberedRays* rays, Baked& baked) {
     RayEnds* const links = rays ? &rays->links : nullptr;
     Series series = expandSeries(gatherer, settings, progress, turns.follow, links);
     baked.rays = series.rays;
@@ -115,6 +115,12 @@ FollowedLight bakeGroups(const Gatherer& gatherer, const BakeSettings& settings,
             gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays, rays ? &rays->gather : nullptr);
         baked.local_light = bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays);
     }
+    return series;
+}
+
+// Makes what gatherGroups() left in `baked` what lightmaps are to hold.
+FollowedLight finishTexels(const Gatherer& gatherer, Series series, const BakeSettings& settings, Progress& progress,
+                           Baked& baked) {
     baked.reports = std::move(series.reports);
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
     FollowedLight followed{std::move(series.radiance), std::move(series.bounces)};
@@ -226,9 +232,11 @@ class Bake {
         const bool fresh_links = rays.links.rows() == 0, fresh_gather = rays.gather.rows() == 0;
         // Only where every receiver is gathered from are there rays from all of them.
         const bool all = turns_.bake[always_group];
-        followed_ = bakeGroups(gatherer(), settings_, turns_, progress_, remembers ? &rays : nullptr, baked_);
+        Series series = gatherGroups(gatherer(), settings_, turns_, progress_, remembers ? &rays : nullptr, baked_);
         if (remembers && fresh_links) store_->keepRays("links", {}, rays.links);
         if (remembers && fresh_gather && all) store_->keepRays("gather", {}, rays.gather);
+        rays = {};
+        followed_ = finishTexels(gatherer(), std::move(series), settings_, progress_, baked_);
         for (uint32_t g = 0; store_ && g < groups_; ++g) {
             if (turns_.bake[g]) store_->keep(g, lightOfGroup(baked_, paths_, g, followed_.bounces[g]));
             if (turns_.follow[g] && settings_.grid.probes_max > 0)

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 
 namespace dimmer::cook {
@@ -34,27 +33,31 @@ glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
 }
 
+using Choice = EmitterSampler::Choice;
+
 // Takes those of the least weight out that have `left_max` together at most. Keeps the order.
-void leaveFaintest(auto& choices, float left_max) {
+void leaveFaintest(std::vector<Choice>& choices, float left_max) {
     std::vector<float> weights;
-    for (const auto& c : choices) weights.push_back(c.probability);
+    for (const Choice& c : choices) weights.push_back(c.cumulative);
     std::ranges::sort(weights);
     float left = 0;
     size_t count = 0;
     while (count + 1 < weights.size() && left + weights[count] <= left_max) left += weights[count++];
-    std::erase_if(choices, [&](const auto& c) { return c.probability < weights[count]; });
+    std::erase_if(choices, [&](const Choice& c) { return c.cumulative < weights[count]; });
 }
 
-// Of weights, as probabilities. Summed up in double: a hundred thousand of them would add up to a thousandth more
-// than 1.
-void makeProbabilities(auto& choices) {
+// Of weights. Summed up in double: a hundred thousand of them would add up to a thousandth more than 1.
+void makeCumulative(std::vector<Choice>& choices) {
     double sum = 0, cumulative = 0;
-    for (const auto& c : choices) sum += static_cast<double>(c.probability);
-    for (auto& c : choices) {
-        cumulative += static_cast<double>(c.probability);
-        c.probability = static_cast<float>(static_cast<double>(c.probability) / sum);
-        c.cumulative = static_cast<float>(cumulative / sum);
-    }
+    for (const Choice& c : choices) sum += static_cast<double>(c.cumulative);
+    for (Choice& c : choices)
+        c.cumulative = static_cast<float>((cumulative += static_cast<double>(c.cumulative)) / sum);
+    if (!choices.empty()) choices.back().cumulative = 1;
+}
+
+// Of the numbers that choose, as they are rounded.
+float probability(std::span<const Choice> choices, size_t i) {
+    return choices[i].cumulative - (i == 0 ? 0 : choices[i - 1].cumulative);
 }
 
 }  // namespace
@@ -98,48 +101,37 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     std::vector<std::vector<uint8_t>> lit(groups.size());
     tbb::parallel_for(size_t{0}, groups.size(), [&](size_t g) { lit[g] = litCells(rays, groups[g]); });
     tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(i, lit); });
-    gatherCells();
+    leaveFaintGroups();
 }
 
-// All cells' ranges and choices in one array each, without the groups that are faint there.
-void EmitterSampler::gatherCells() {
+// Takes groups out of the cells where they are faint.
+void EmitterSampler::leaveFaintGroups() {
     struct Group {
         double light = 0, cells = 0;
-        std::optional<GroupRange> by_power;
     };
     std::vector<Group> groups(identities_.size());
     for (const Cell& cell : cells_)
-        for (const CellRange& r : cell) {
-            groups[r.group].light += static_cast<double>(r.light);
-            ++groups[r.group].cells;
+        for (const CellGroup& c : cell) {
+            groups[c.group].light += static_cast<double>(c.light);
+            ++groups[c.group].cells;
         }
-    first_range_.push_back(0);
+    by_power_.resize(groups.size());
     for (Cell& cell : cells_) {
-        for (const CellRange& r : cell) {
-            Group& group = groups[r.group];
-            const double least = static_cast<double>(cell_share_min) * group.light / group.cells;
-            if (!r.wide && static_cast<double>(r.light) < least) continue;
-            if (r.choices.empty() && !group.by_power) group.by_power = store(r.group, choicesByPower(r.group));
-            ranges_.push_back(r.choices.empty() ? *group.by_power : store(r.group, r.choices));
-        }
-        first_range_.push_back(static_cast<uint32_t>(ranges_.size()));
-        cell = {};
+        std::erase_if(cell, [&](const CellGroup& c) {
+            const double mean = groups[c.group].light / groups[c.group].cells;
+            return !c.wide && static_cast<double>(c.light) < static_cast<double>(cell_share_min) * mean;
+        });
+        for (const CellGroup& c : cell)
+            if (c.choices.empty() && by_power_[c.group].empty()) by_power_[c.group] = choicesByPower(c.group);
     }
-    cells_ = {};
-}
-
-EmitterSampler::GroupRange EmitterSampler::store(uint32_t group, std::span<const Choice> choices) {
-    const auto first = static_cast<uint32_t>(choices_.size());
-    choices_.insert(choices_.end(), choices.begin(), choices.end());
-    return {group, identities_[group], first, static_cast<uint32_t>(choices.size())};
 }
 
 std::vector<EmitterSampler::Choice> EmitterSampler::choicesByPower(uint32_t group) const {
     std::vector<Choice> choices;
     for (uint32_t i = 0; i < emitters_.size(); ++i)
         if (emitters_[i].group == group)
-            choices.push_back({i, luminance(emitters_[i].radiance_cd_m2) * emitters_[i].area_m2, 0});
-    makeProbabilities(choices);
+            choices.push_back({i, luminance(emitters_[i].radiance_cd_m2) * emitters_[i].area_m2});
+    makeCumulative(choices);
     return choices;
 }
 
@@ -187,28 +179,29 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
             const float near2 = radius_m * radius_m + e.area_m2;
             const float weight =
                 luminance(e.radiance_cd_m2) * e.area_m2 / std::max(glm::dot(to_centre, to_centre), near2);
-            choices.push_back({static_cast<uint32_t>(i), weight, 0});
+            choices.push_back({static_cast<uint32_t>(i), weight});
             sum += weight;
         }
         if (!(sum > 0)) continue;
         if (choices.size() <= sorted_max) leaveFaintest(choices, left_share_max * sum);
         if (choices.size() > choices_max) choices = {};
-        makeProbabilities(choices);
+        makeCumulative(choices);
         choices.shrink_to_fit();
+        const uint32_t group = emitters_[range_begin].group;
         cells_[index].push_back(
-            {emitters_[range_begin].group, sum, sum > coverage_min * pi * brightest, std::move(choices)});
+            {group, identities_[group], sum, sum > coverage_min * pi * brightest, std::move(choices)});
     }
 }
 
-std::span<const EmitterSampler::GroupRange> EmitterSampler::groups(uint32_t cell) const {
+std::span<const EmitterSampler::CellGroup> EmitterSampler::groups(uint32_t cell) const {
     if (emitters_.empty()) return {};
-    return {ranges_.data() + first_range_[cell], first_range_[cell + 1] - first_range_[cell]};
+    return cells_[cell];
 }
 
-EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 u) const {
-    const auto begin = choices_.begin() + range.first, end = begin + range.count;
-    auto it = std::upper_bound(begin, end, choice, [](float v, const Choice& c) { return v < c.cumulative; });
-    if (it == end) --it;
+EmitterSample EmitterSampler::sample(const CellGroup& from, glm::vec3 point, float choice, glm::vec2 u) const {
+    const std::span<const Choice> choices = choicesOf(from);
+    auto it = std::ranges::upper_bound(choices, choice, {}, &Choice::cumulative);
+    if (it == choices.end()) --it;
     const Emitter& e = emitters_[it->emitter];
     const glm::vec2 at = onTriangle(u);
     const glm::vec3 to_target = pointOn(e, at) - point;
@@ -219,7 +212,8 @@ EmitterSample EmitterSampler::sample(const GroupRange& range, glm::vec3 point, f
     float cos_emitter = -glm::dot(direction, e.normal);
     if (e.double_sided) cos_emitter = std::abs(cos_emitter);
     if (!(cos_emitter > 0)) return {};
-    const float pdf = it->probability * distance2 / (e.area_m2 * cos_emitter);
+    const auto index = static_cast<size_t>(it - choices.begin());
+    const float pdf = probability(choices, index) * distance2 / (e.area_m2 * cos_emitter);
     return {direction, distance, e.radiance_cd_m2, e.triangle, at, pdf};
 }
 
@@ -229,12 +223,13 @@ const Emitter* EmitterSampler::emitterOf(uint32_t triangle) const {
 
 float EmitterSampler::pdf(uint32_t cell, const Emitter& emitter, float distance_m, float cos_emitter) const {
     const auto index = static_cast<uint32_t>(&emitter - emitters_.data());
-    for (const GroupRange& r : groups(cell)) {
-        if (r.group != emitter.group) continue;
-        const auto begin = choices_.begin() + r.first, end = begin + r.count;
-        const auto it = std::lower_bound(begin, end, index, [](const Choice& c, uint32_t i) { return c.emitter < i; });
-        if (it == end || it->emitter != index) return 0;
-        return it->probability * distance_m * distance_m / (emitter.area_m2 * std::max(cos_emitter, 1e-6f));
+    for (const CellGroup& from : groups(cell)) {
+        if (from.group != emitter.group) continue;
+        const std::span<const Choice> choices = choicesOf(from);
+        const auto it = std::ranges::lower_bound(choices, index, {}, &Choice::emitter);
+        if (it == choices.end() || it->emitter != index) return 0;
+        return probability(choices, static_cast<size_t>(it - choices.begin())) * distance_m * distance_m /
+               (emitter.area_m2 * std::max(cos_emitter, 1e-6f));
     }
     return 0;
 }

@@ -45,17 +45,24 @@ class EmitterSampler {
    public:
     EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups);
 
-    // The groups worth sampling from `cell`.
-    struct GroupRange {
+    struct Choice {
+        uint32_t emitter;
+        float cumulative;  // the chance of this one and of those before it
+    };
+    // What a cell asks of one group.
+    struct CellGroup {
         uint32_t group;
-        uint32_t identity;      // of the group, for seeds
-        uint32_t first, count;  // into the choices
+        uint32_t identity;            // of the group, for seeds
+        float light;                  // radiance times solid angle, about
+        bool wide;                    // it fills a share of the hemisphere that counts
+        std::vector<Choice> choices;  // by emitter; none where there would be too many: those by power
     };
     uint32_t cellAt(glm::vec3 point) const { return grid_.at(point); }
-    std::span<const GroupRange> groups(uint32_t cell) const;
+    // The groups worth sampling from `cell`.
+    std::span<const CellGroup> groups(uint32_t cell) const;
 
     // `choice`, `u`: uniform in 0..1: which emitter, and where on it.
-    EmitterSample sample(const GroupRange& range, glm::vec3 point, float choice, glm::vec2 u) const;
+    EmitterSample sample(const CellGroup& from, glm::vec3 point, float choice, glm::vec2 u) const;
 
     // The emitter of a level triangle, or null.
     const Emitter* emitterOf(uint32_t triangle) const;
@@ -66,35 +73,22 @@ class EmitterSampler {
     std::span<const Emitter> emitters() const { return emitters_; }
 
    private:
-    struct Choice {
-        uint32_t emitter;
-        float probability;
-        float cumulative;  // up to and including this one
-    };
-    // What a cell asks of one group; no choices of its own where there would be too many.
-    struct CellRange {
-        uint32_t group;
-        float light;  // radiance times solid angle, about
-        bool wide;    // it fills a share of the hemisphere that counts
-        std::vector<Choice> choices;
-    };
-    using Cell = std::vector<CellRange>;
+    using Cell = std::vector<CellGroup>;
     std::vector<uint8_t> litCells(const RayScene& rays, std::span<const Emitter> of_group) const;
     // `lit`: per range of emitters of one group, in order, the cells that it shines into.
     void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);
-    void gatherCells();
+    void leaveFaintGroups();
     std::vector<Choice> choicesByPower(uint32_t group) const;
-    GroupRange store(uint32_t group, std::span<const Choice> choices);
+    std::span<const Choice> choicesOf(const CellGroup& from) const {
+        return from.choices.empty() ? by_power_[from.group] : from.choices;
+    }
 
     std::vector<Emitter> emitters_;  // sorted by group
     std::vector<uint32_t> emitter_of_;
     std::vector<uint32_t> identities_;  // per light group
     CellGrid grid_;
     std::vector<Cell> cells_;
-    // All cells' choices in one array each, so that ranges stay valid.
-    std::vector<uint32_t> first_range_;
-    std::vector<GroupRange> ranges_;
-    std::vector<Choice> choices_;
+    std::vector<std::vector<Choice>> by_power_;  // per light group, where a cell has none of its own
 };
 
 }  // namespace dimmer::cook

@@ -89,9 +89,9 @@ void RayEnds::unpack(const Packed& packed, size_t row, std::vector<uint32_t>& ou
     }
 }
 
-std::vector<std::byte> RayEnds::toBytes() const {
+std::vector<std::byte> RayEnds::toBytes(size_t part) const {
     format::ByteWriter out;
-    for (const Block& block : blocks_)
+    for (const Block& block : blocksOf(part))
         for (const Packed* packed : {&block.ends, &block.through}) {
             out.putArray(std::span<const uint32_t>(packed->first));
             out.putArray(std::span<const uint32_t>(packed->words));
@@ -105,17 +105,20 @@ bool RayEnds::areOf(const Packed& packed, size_t rows) const {
            packed.words.size() == wordsFor(packed.first.back(), bits_);
 }
 
-std::optional<RayEnds> RayEnds::fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers,
-                                          uint32_t paths) {
+bool RayEnds::fromBytes(size_t part, std::span<const std::byte> bytes) {
     format::ByteReader in(bytes);
-    RayEnds ends(rows, receivers, paths);
-    for (size_t b = 0; b < ends.blocks_.size(); ++b)
-        for (Packed* packed : {&ends.blocks_[b].ends, &ends.blocks_[b].through}) {
+    std::vector<Block> blocks(blocksOf(part).size());
+    const size_t first = part * blocks_per_part;
+    for (size_t b = 0; b < blocks.size(); ++b)
+        for (Packed* packed : {&blocks[b].ends, &blocks[b].through}) {
             packed->first = in.getArray<uint32_t>();
             packed->words = in.getArray<uint32_t>();
-            if (!in.ok() || !ends.areOf(*packed, std::min(rows - b * rows_per_block, rows_per_block))) return {};
+            const size_t rows_left = rows_ - (first + b) * rows_per_block;
+            if (!in.ok() || !areOf(*packed, std::min(rows_left, rows_per_block))) return false;
         }
-    return in.atEnd() ? std::optional(std::move(ends)) : std::nullopt;
+    if (!in.atEnd()) return false;
+    std::ranges::move(blocks, blocks_.begin() + static_cast<std::ptrdiff_t>(first));
+    return true;
 }
 
 }  // namespace dimmer::cook

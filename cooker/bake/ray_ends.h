@@ -1,9 +1,9 @@
 // Where rays ended, for going there again: what a ray hits does not depend on which light is asked about.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -64,12 +64,16 @@ class RayEnds {
     // time.
     void putBlock(size_t block, std::span<const RowEnds> rows);
 
-    std::vector<std::byte> toBytes() const;
-    // Nothing where they are not ends of so many rows.
-    static std::optional<RayEnds> fromBytes(std::span<const std::byte> bytes, size_t rows, uint32_t receivers,
-                                            uint32_t paths);
+    // For a store, part by part: all of them may be half a gigabyte, and nobody copies that as a whole. Both are
+    // thread-safe for different parts.
+    size_t parts() const { return (blocks_.size() + blocks_per_part - 1) / blocks_per_part; }
+    std::vector<std::byte> toBytes(size_t part) const;
+    // False, and nothing of the part is known, where they are not ends of so many rows.
+    bool fromBytes(size_t part, std::span<const std::byte> bytes);
 
    private:
+    static constexpr size_t blocks_per_part = 64;  // at most 40 MB
+
     // Numbers of `bits_` bits.
     struct Packed {
         std::vector<uint32_t> first;  // per row and one more
@@ -82,6 +86,10 @@ class RayEnds {
     std::vector<uint32_t> packed(std::span<const uint32_t> numbers) const;
     void unpack(const Packed& packed, size_t row, std::vector<uint32_t>& out) const;
     bool areOf(const Packed& packed, size_t rows) const;
+    std::span<const Block> blocksOf(size_t part) const {
+        return std::span(blocks_).subspan(part * blocks_per_part,
+                                          std::min(blocks_per_part, blocks_.size() - part * blocks_per_part));
+    }
     uint32_t code(uint32_t end) const { return end < receivers_ ? end : receivers_ + (RayEnd::again - end); }
     // What is none of them is traced again.
     uint32_t end(uint32_t code) const {

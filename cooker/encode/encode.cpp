@@ -92,14 +92,14 @@ TexelRecord encodeTexel(const Gathered& light, const TexelEncoding& encoding) {
 }
 
 float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
-    constexpr float half_of_largest = 64512.0f / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
-    float largest = 0;
+    constexpr double half_of_largest = 64512.0 / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
+    double largest = 0;
     // A record is stored as it is at weight 1, whether the game may set that or not.
     const auto consider = [&](const auto& row, auto&& valueOf) {
-        glm::vec3 sum(0);
+        glm::dvec3 sum(0);  // as largest weights may be as large as floats are
         for (const auto& l : row) {
-            const glm::vec3 value = valueOf(l.light);
-            sum += max_weights[l.term] * value;
+            const glm::dvec3 value = valueOf(l.light);
+            sum += static_cast<double>(max_weights[l.term]) * value;
             largest = std::max({largest, value.x, value.y, value.z});
         }
         largest = std::max({largest, sum.x, sum.y, sum.z});
@@ -109,9 +109,9 @@ float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
     for (const auto* probes : {&baked.grid.light, &baked.local_light})
         for (size_t i = 0; i < probes->rows(); ++i)
             consider(probes->row(i), [](const ProbeLight& light) { return light.radiance[0]; });
-    if (!(largest > 0) || !std::isfinite(largest)) return 1;
-    constexpr float most = exposure_log2_max;
-    return std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -most, most));
+    if (!(largest > 0)) return 1;
+    constexpr double most = exposure_log2_max;
+    return static_cast<float>(std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -most, most)));
 }
 
 }  // namespace dimmer::cook

@@ -29,12 +29,13 @@ std::optional<CookCache> openCache(const CookOptions& options, CookStats& stats)
     return {};
 }
 
-Key packKey(const Scene& scene, const Profile& profile, const std::string& quality, CookCache& cache) {
+Key packKey(const Scene& scene, const Profile& profile, const CookOptions& options, CookCache& cache) {
     const Key level = sceneKey(scene);
-    const Quality* q = profile.quality(quality);
+    const Quality* q = profile.quality(options.quality);
     const Key settings = KeyBuilder("settings")
-                             .add(profile.settingsJson(quality))
+                             .add(profile.settingsJson(options.quality))
                              .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{}, scene)))
+                             .add(uint32_t{options.fit})
                              .finish();
     cache.dependsOn("level", level);
     cache.dependsOn("settings", settings);
@@ -49,6 +50,9 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
     result.stats.warnings = std::move(entry.warnings);
     result.stats.bounces = entry.bounces;
     result.stats.suggested_combinations = std::move(entry.suggested_combinations);
+    result.fitted = std::move(entry.fitted);
+    for (const Remedy& remedy : result.fitted)
+        if (auto ok = applyRemedy(remedy, result.profile); !ok) return std::unexpected(ok.error());
     return std::move(entry.pack);
 }
 
@@ -61,16 +65,21 @@ Expected<std::vector<std::byte>> makePack(const Scene& scene, const CookOptions&
     return packBytes(result.pack, static_cast<int>(result.profile.quality(options.quality)->zstd_level));
 }
 
-// From the cache or anew. Fitted packs are made anew from what the cache has of their parts.
+// From the cache or anew.
 Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOptions& options, Progress& progress,
                                                 CookCache* cache, CookResult& result) {
-    if (!cache || options.fit) return makePack(scene, options, progress, cache, result);
-    const Key key = packKey(scene, result.profile, options.quality, *cache);
+    if (!cache) return makePack(scene, options, progress, cache, result);
+    const Key key = packKey(scene, result.profile, options, *cache);
     if (auto entry = cache->findPack(key)) return takePack(std::move(*entry), result);
     auto bytes = makePack(scene, options, progress, cache, result);
     if (bytes)
-        cache->keepPack(
-            key, {*bytes, result.stats.bounces, result.stats.warnings, result.stats.suggested_combinations, {}, {}});
+        cache->keepPack(key, {.pack = *bytes,
+                              .bounces = result.stats.bounces,
+                              .warnings = result.stats.warnings,
+                              .suggested_combinations = result.stats.suggested_combinations,
+                              .parts = {},
+                              .depends = {},
+                              .fitted = result.fitted});
     return bytes;
 }
 

@@ -24,6 +24,34 @@ size_t blocksPerEntry(size_t blocks) {
     return std::max<size_t>(1, (blocks + site_entries_max - 1) / site_entries_max);
 }
 
+void put(const Remedy& remedy, format::ByteWriter& out) {
+    out.put(static_cast<uint32_t>(remedy.changes.size()));
+    for (const Change& c : remedy.changes) {
+        out.putString(c.key);
+        out.put(c.from);
+        out.put(c.to);
+    }
+    out.put(remedy.saves);
+    out.put(remedy.error);
+    out.put(remedy.energy);
+    for (const bool flag : {remedy.fits, remedy.moves_light, remedy.texels}) out.put(static_cast<uint32_t>(flag));
+}
+
+Remedy getRemedy(format::ByteReader& in) {
+    Remedy remedy;
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {
+        Change& c = remedy.changes.emplace_back();
+        c.key = in.getString();
+        c.from = in.get<float>();
+        c.to = in.get<float>();
+    }
+    remedy.saves = in.get<uint64_t>();
+    remedy.error = in.get<double>();
+    remedy.energy = in.get<double>();
+    for (bool* flag : {&remedy.fits, &remedy.moves_light, &remedy.texels}) *flag = in.get<uint32_t>() != 0;
+    return remedy;
+}
+
 std::vector<std::byte> toBytes(const PackEntry& entry) {
     format::ByteWriter out;
     out.put(entry.bounces);
@@ -41,6 +69,8 @@ std::vector<std::byte> toBytes(const PackEntry& entry) {
         out.putString(part);
         out.putString(key);
     }
+    out.put(static_cast<uint32_t>(entry.fitted.size()));
+    for (const Remedy& remedy : entry.fitted) put(remedy, out);
     out.putArray(std::span<const std::byte>(entry.pack));
     return out.take();
 }
@@ -60,6 +90,7 @@ std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
         std::string part = in.getString();
         entry.depends[std::move(part)] = in.getString();
     }
+    for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.fitted.push_back(getRemedy(in));
     entry.pack = in.getArray<std::byte>();
     return in.atEnd() ? std::optional(std::move(entry)) : std::nullopt;
 }
@@ -70,6 +101,10 @@ std::map<std::string, std::string> readLedger(std::span<const std::byte> bytes) 
     std::istringstream text(std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
     for (std::string part, key; std::getline(text, part, '\t') && std::getline(text, key);) parts[part] = key;
     return parts;
+}
+
+Key partKey(const Key& whole, size_t part) {
+    return KeyBuilder("part").add(whole).add(uint64_t{part}).finish();
 }
 
 std::vector<std::string> partsOfGroup(const std::string& what) {
@@ -260,12 +295,25 @@ void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
 }
 
 std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers, uint32_t paths) {
-    const Entry entry = look(rays_kind, key);
-    return entry.find == Find::Hit ? RayEnds::fromBytes(entry.bytes, rows, receivers, paths) : std::nullopt;
+    RayEnds ends(rows, receivers, paths);
+    std::vector<uint8_t> found(ends.parts());
+    tbb::parallel_for(size_t{0}, ends.parts(), [&](size_t part) {
+        const Entry entry = store_.find(rays_kind, partKey(key, part));
+        found[part] = entry.find == Find::Hit && ends.fromBytes(part, entry.bytes);
+    });
+    if (std::ranges::count(found, 1) < std::ssize(found) || found.empty()) return {};
+    for (size_t part = 0; part < ends.parts(); ++part)
+        used_.push_back(CacheStore::nameOf(rays_kind, partKey(key, part)));
+    return ends;
 }
 
 void CookCache::keepRays(const Key& key, const RayEnds& ends) {
-    keep(rays_kind, key, ends.toBytes());
+    std::vector<Expected<void>> kept(ends.parts());
+    tbb::parallel_for(size_t{0}, ends.parts(), [&](size_t part) {
+        kept[part] = store_.keep(rays_kind, partKey(key, part), ends.toBytes(part));
+    });
+    for (size_t part = 0; part < ends.parts(); ++part)
+        note(CacheStore::nameOf(rays_kind, partKey(key, part)), kept[part]);
 }
 
 void CookCache::finish(uint64_t bytes_max) {

@@ -4,6 +4,7 @@
 #include <cache/entries.h>
 #include <cache/scene_keys.h>
 #include <cache/store.h>
+#include <pipeline/fit.h>
 
 #include <map>
 #include <string>
@@ -26,6 +27,7 @@ struct PackEntry {
     std::vector<std::pair<std::string, std::string>> suggested_combinations;
     std::vector<std::string> parts;  // names of the entries that it was made from: whoever finds the pack uses them too
     std::map<std::string, std::string> depends;  // part -> key of what they depend on, as of CookCache::dependsOn
+    std::vector<Remedy> fitted;                  // what `--fit` changed
 };
 
 // The cache as one cook of one pack uses it. Remembers what the last cook of the pack depended on, to say what changed.

@@ -34,6 +34,12 @@ std::string changedBefore(const std::vector<Remedy>& fitted) {
 
 }  // namespace
 
+Expected<void> applyRemedy(const Remedy& remedy, Profile& profile) {
+    for (const Change& c : remedy.changes)
+        if (auto ok = assignText(profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok) return ok;
+    return {};
+}
+
 Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
                               CookCache* cache, CookResult& result) {
     const std::vector<std::string> import_warnings = result.stats.warnings;
@@ -61,9 +67,7 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
             return fail(ErrorCode::OverBudget,
                         within.error().message + why + waysOut(found) + changedBefore(result.fitted));
         }
-        for (const Change& c : remedy.changes)
-            if (auto ok = assignText(result.profile, fmt::format("{}={}", c.key, c.to), "--fit", "fit"); !ok)
-                return std::unexpected(ok.error());
+        if (auto ok = applyRemedy(remedy, result.profile); !ok) return std::unexpected(ok.error());
         result.fitted.push_back(std::move(remedy));
     }
 }

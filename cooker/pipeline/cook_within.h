@@ -10,4 +10,7 @@ namespace dimmer::cook {
 Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
                               CookCache* cache, CookResult& result);
 
+// What `--fit` changes.
+Expected<void> applyRemedy(const Remedy& remedy, Profile& profile);
+
 }  // namespace dimmer::cook

@@ -41,20 +41,26 @@ std::vector<uint32_t> describeContributions(const Scene& scene, const Baked& bak
 }
 
 void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats) {
-    std::vector<bool> used(scene.doors.size());
+    std::vector<bool> used(scene.doors.size()), faint(scene.doors.size());
+    constexpr const char* below =
+        "changes light by less than its activity threshold everywhere; it is kept, and does nothing. Lower "
+        "'records.threshold'";
     for (uint32_t t = 0; t < baked.terms.size(); ++t) {
         const Term& term = baked.terms[t];
-        if (baked.reports[t].receivers > 0)
-            for (const auto* doors : {&term.doors_open, &term.doors_closed})
-                for (const uint32_t door : *doors) used[door] = true;
-        else if (term.free() && term.group != always_group)
-            stats.warnings.push_back(fmt::format("{}: light set '{}' reaches no surface; it is kept, and does nothing",
-                                                 scene.file, scene.light_sets[term.group - 1].name));
+        const bool active = baked.reports[t].receivers > 0, arrives = baked.reports[t].energy > 0;
+        for (const auto* doors : {&term.doors_open, &term.doors_closed})
+            for (const uint32_t door : *doors) {
+                used[door] = used[door] || active;
+                faint[door] = faint[door] || arrives;
+            }
+        if (active || !term.free() || term.group == always_group) continue;
+        stats.warnings.push_back(fmt::format("{}: light set '{}' {}", scene.file, scene.light_sets[term.group - 1].name,
+                                             arrives ? below : "reaches no surface; it is kept, and does nothing"));
     }
     for (uint32_t d = 0; d < used.size(); ++d)
         if (!used[d])
-            stats.warnings.push_back(fmt::format("{}: door '{}' changes no light; it is kept, and does nothing",
-                                                 scene.file, scene.doors[d].name));
+            stats.warnings.push_back(fmt::format("{}: door '{}' {}", scene.file, scene.doors[d].name,
+                                                 faint[d] ? below : "changes no light; it is kept, and does nothing"));
 }
 
 void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& stats) {

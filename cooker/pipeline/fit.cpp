@@ -1,5 +1,6 @@
 #include <pipeline/fit.h>
 
+#include <pipeline/human_bytes.h>
 #include <pipeline/settings.h>
 
 #include <fmt/format.h>
@@ -8,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <tuple>
 #include <utility>
 
 namespace dimmer::cook {
@@ -258,6 +260,7 @@ Remedy withProbes(const PackData& pack, const PackCost& cost, const Profile& pro
         {"grids.probes_max", static_cast<float>(profile.probes_max), static_cast<float>(to - corners)});
     remedy.saves = scaled(cost.global_grid, 1 - ratio(to, probes));
     remedy.moves_light = true;
+    remedy.texels = false;
     return remedy;
 }
 
@@ -289,6 +292,7 @@ Remedy byAll(const PackData& pack, const PackCost& cost, const Profile& profile,
     rest.global_grid -= probes.saves;
     Remedy both = byDensity(rest, profile, losses, density_steps);
     if (both.changes.empty()) both.fits = !pagesOrRecordsAreOver(rest, profile);
+    both.texels = !both.changes.empty();
     both.changes.insert(both.changes.end(), probes.changes.begin(), probes.changes.end());
     both.saves += probes.saves;
     both.moves_light = true;
@@ -316,6 +320,7 @@ Remedy byLocalProbes(const PackData& pack, const PackCost& cost, const Profile& 
     remedy.fits =
         bytesAt(to) <= profile.budget_local_grids && !pagesOrRecordsAreOver(cost, others) && !gridIsOver(cost, profile);
     remedy.moves_light = true;
+    remedy.texels = false;
     return remedy;
 }
 
@@ -352,10 +357,10 @@ std::string Remedy::text() const {
         if (parts.size() < named_max) parts.push_back(fmt::format("{} {} -> {}", c.key, c.from, c.to));
     const std::string more =
         changes.size() > named_max ? fmt::format(" and {} more", changes.size() - named_max) : std::string();
-    return fmt::format("{}{}: saves {:.2f} MB, adds a mean error of {:.2f} %{}{}", fmt::join(parts, ", "), more,
-                       static_cast<double>(saves) / 1e6, 100 * error,
+    return fmt::format("{}{}: saves {}{}{}{}", fmt::join(parts, ", "), more, humanBytes(saves),
+                       texels ? fmt::format(", adds a mean error of {:.2f} %", 100 * error) : "",
                        energy > 0 ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy) : "",
-                       moves_light ? ", coarsens the light of models" : "");
+                       moves_light ? ", coarsens the light of models by what is not predicted" : "");
 }
 
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
@@ -378,9 +383,8 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
         by(firstFitting(losses, limits, no_index));
         if (const uint32_t largest = largestSet(pack, cost); largest > 0) by(firstFitting(losses, limits, largest));
     }
-    std::ranges::stable_sort(found, [](const Remedy& a, const Remedy& b) {
-        return std::pair(!a.fits, a.error) < std::pair(!b.fits, b.error);
-    });
+    // What is not predicted comes last.
+    std::ranges::stable_sort(found, {}, [](const Remedy& r) { return std::tuple(!r.fits, r.moves_light, r.error); });
     return found;
 }
 

@@ -24,7 +24,8 @@ struct Remedy {
     uint64_t saves = 0;        // bytes of device memory
     double error = 0;          // mean relative error that it adds, all sets at weight 1; see LossTable
     double energy = 0;         // of the set that loses most, the share of its stored light
-    bool moves_light = false;  // it is the light of what moves that gets coarser, not that of lightmaps
+    bool moves_light = false;  // the light of what moves gets coarser; by how much is not predicted
+    bool texels = true;        // that of lightmaps changes, by `error`
     std::string text() const;
 };
 

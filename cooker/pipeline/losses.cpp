@@ -68,7 +68,7 @@ LossTable::TexelsLeft LossTable::texelsLeft(double factor) const {
 }
 
 ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_size) {
-    ChartSizes out{page_size, {}, std::vector<bool>(unwrap.charts.size())};
+    ChartSizes out{page_size, {}, std::vector<bool>(unwrap.charts.size()), unwrap.face_chart};
     for (const Chart& c : unwrap.charts) out.charts.emplace_back(c.width, c.height);
     for (size_t f = 0; f < unwrap.faces.size(); ++f) {
         const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[unwrap.faces[f].triangle].mesh];
@@ -84,13 +84,6 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
       copies_(copiesOf(texels)),
       shown_(listTexels(texels)),
       sizes_(std::move(sizes)) {
-    uint64_t fixed = 0, all = 0;
-    for (size_t i = 0; i < sizes_.charts.size(); ++i) {
-        const uint64_t area = areaOf(sizes_.charts[i]);
-        all += area;
-        fixed += sizes_.fixed[i] ? area : 0;
-    }
-    fixed_texels_ = static_cast<double>(fixed) / static_cast<double>(std::max<uint64_t>(all, 1));
     for (const Term& term : terms_) {
         group_count_ = std::max(group_count_, term.group + 1);
         for (const auto* list : {&term.doors_open, &term.doors_closed})
@@ -108,7 +101,7 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
     forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t k) { add(r.receiver, r.term, lux[k]); });
     for (StateLight& state : states) state.setFloor(copies_);
     weigh(texels, lux, states);
-    measureCurvature(texels, states[0].lux, states[0].floor_lux);
+    coarser_ = CoarserTexels(texels, sizes_.of_face, sizes_.fixed, states[0].lux, states[0].floor_lux);
 }
 
 std::vector<float> LossTable::listRecords(const Baked& baked, std::span<const float> thresholds) {
@@ -170,33 +163,6 @@ LossSteps LossTable::steps(const Rungs& rungs) const {
         if (r.lost_at < threshold_rungs.size()) sum.add(groupOf(r), r.lost_at, loss, terms_[r.term]);
     });
     return sum;
-}
-
-// Over neighbours on the pages, which charts' padding continues; |left + right - 2 here| / 2 along both axes.
-void LossTable::measureCurvature(const Texels& texels, const std::vector<float>& lux, float floor_lux) {
-    std::vector<std::pair<uint32_t, uint32_t>> by_address;
-    for (uint32_t i = 0; i < texels.size(); ++i) by_address.emplace_back(texels.address[i], i);
-    for (const FillTexel& fill : texels.fills) by_address.emplace_back(fill.address, fill.source);
-    std::ranges::sort(by_address);
-    const auto at = [&](uint32_t address) {
-        const auto it = std::ranges::lower_bound(by_address, address, {}, [](const auto& p) { return p.first; });
-        return it != by_address.end() && it->first == address ? &lux[it->second] : nullptr;
-    };
-    double sum = 0, count = 0;
-    for (uint32_t i = 0; i < texels.size(); ++i) {
-        const uint32_t a = texels.address[i], page = TexelAddress::page(a), x = TexelAddress::x(a),
-                       y = TexelAddress::y(a);
-        if (x == 0 || y == 0 || !(lux[i] + floor_lux > 0)) continue;
-        double here = 0;
-        for (const auto& [dx, dy] : {std::pair{1u, 0u}, {0u, 1u}}) {
-            const float* before = at(TexelAddress::pack(page, x - dx, y - dy));
-            const float* after = at(TexelAddress::pack(page, x + dx, y + dy));
-            if (before && after) here += static_cast<double>(std::abs(*before + *after - 2 * lux[i]) / 2);
-        }
-        sum += here / static_cast<double>(lux[i] + floor_lux);
-        ++count;
-    }
-    curvature_ = count > 0 ? sum / count : 0;
 }
 
 Loss LossTable::loss(const Rungs& rungs) const {

@@ -4,6 +4,7 @@
 #include <bake/bake.h>
 #include <charts/texels.h>
 #include <cluster/texel_groups.h>
+#include <pipeline/coarser_texels.h>
 
 #include <array>
 #include <cstdint>
@@ -36,6 +37,7 @@ struct ChartSizes {
     uint32_t page_size = 0;
     std::vector<glm::uvec2> charts;  // texels, padding included
     std::vector<bool> fixed;
+    std::vector<uint32_t> of_face;  // the chart of each
 };
 ChartSizes chartSizes(const RayScene& rays, const Unwrap& unwrap, uint32_t page_size);
 
@@ -79,14 +81,8 @@ class LossTable {
     LossSteps steps(const Rungs& rungs) const;
     // Whether receivers hold only so many records: then steps() at other rungs are others.
     bool isLimited() const { return overlap_max_ != UINT32_MAX; }
-    // Mean relative error of texels `factor` times as long, against those there are: of second differences of the light
-    // along the pages, an eighth of which a box of a texel and bilinear filtering lose where light is smooth
-    // (sharpening wins most of it back, edges lose about as much). That holds for small errors and grows for ever;
-    // where it does not, what is returned nears 1, which is all the light there is.
-    double densityError(double factor) const {
-        const double error = (1 - fixed_texels_) * (factor * factor - 1) * curvature_ / 4;
-        return error / (1 + error);
-    }
+    // Mean relative error of texels `factor` times as long, against those there are, all doors closed.
+    double densityError(double factor) const { return coarser_.error(factor); }
     // Of texels `factor` times as long, the share that is left of how many charts have, and of the pages, which charts
     // do not fill. Without charts, as area goes. Cost: packs the charts anew.
     struct TexelsLeft {
@@ -109,7 +105,6 @@ class LossTable {
     // Returns the records' light.
     std::vector<float> listRecords(const Baked& baked, std::span<const float> thresholds);
     void weigh(const Texels& texels, std::span<const float> lux, std::span<const StateLight> states);
-    void measureCurvature(const Texels& texels, const std::vector<float>& lux, float floor_lux);
 
     std::vector<Term> terms_;
     uint32_t group_count_ = 0, door_count_ = 0;
@@ -117,9 +112,8 @@ class LossTable {
     std::vector<Record> records_;   // by receiver, the brightest first
     std::vector<uint32_t> copies_;  // texels that show a receiver
     std::vector<ShownTexel> shown_;
-    double curvature_ = 0;
     ChartSizes sizes_;
-    double fixed_texels_ = 0;  // share of charts' texels
+    CoarserTexels coarser_;
 };
 
 }  // namespace dimmer::cook

@@ -27,15 +27,17 @@ std::unexpected<Error> badProfile(const std::string& source, const std::string& 
     return fail(ErrorCode::BadInput, fmt::format("profile {}: {}", source, text));
 }
 
-// Flattens nested objects to dotted keys.
-void flatten(const json& object, const std::string& prefix, std::map<std::string, json>& out) {
+// Flattens nested objects to dotted keys; empty ones stay what they are. Returns a key that is there twice, or nothing.
+std::string flatten(const json& object, const std::string& prefix, std::map<std::string, json>& out) {
+    std::string twice;
     for (const auto& [key, value] : object.items()) {
         const std::string path = prefix.empty() ? key : prefix + "." + key;
-        if (value.is_object())
-            flatten(value, path, out);
-        else
-            out[path] = value;
+        if (value.is_object() && !value.empty())
+            twice = std::max(twice, flatten(value, path, out));
+        else if (!out.emplace(path, value).second)
+            twice = path;
     }
+    return twice;
 }
 
 // A JSON document with where it stands.
@@ -54,18 +56,33 @@ constexpr int nesting_max = 3;
 class KeysOnce {
    public:
     void see(json::parse_event_t event, const json& parsed) {
-        if (event == json::parse_event_t::object_start) open_.emplace_back();
+        if (event == json::parse_event_t::object_start) open_.push_back({open_.empty() ? "" : last_ + ".", {}});
         if (event == json::parse_event_t::object_end && !open_.empty()) open_.pop_back();
         if (event != json::parse_event_t::key || open_.empty()) return;
         const auto key = parsed.get<std::string>();
-        if (!open_.back().insert(key).second && twice_.empty()) twice_ = key;
+        last_ = open_.back().prefix + key;
+        if (!open_.back().keys.insert(key).second && twice_.empty()) twice_ = last_;
     }
-    const std::string& twice() const { return twice_; }
+    const std::string& twice() const { return twice_; }  // dotted
 
    private:
-    std::vector<std::set<std::string>> open_;
-    std::string twice_;
+    struct Object {
+        std::string prefix;
+        std::set<std::string> keys;
+    };
+    std::vector<Object> open_;
+    std::string last_, twice_;
 };
+
+std::string placeOf(const std::string& key, const Source& source) {
+    const auto lines = linesOfKeys(source.text);
+    const auto line = lines.find(key);
+    return line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
+}
+
+std::unexpected<Error> isTwice(const std::string& key, const Source& source) {
+    return badProfile(placeOf(key, source), fmt::format("'{}' is there twice", key));
+}
 
 Expected<json> parseObject(const Source& source) {
     bool too_deep = false;
@@ -73,13 +90,13 @@ Expected<json> parseObject(const Source& source) {
     const auto shallow = [&](int depth, json::parse_event_t event, const json& parsed) {
         const bool start = event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
         too_deep = too_deep || (start && depth >= nesting_max);
-        keys.see(event, parsed);
+        if (!too_deep) keys.see(event, parsed);
         return !too_deep;
     };
     try {
         json root = json::parse(source.text, shallow);
         if (too_deep) return badProfile(source.name, "it nests deeper than any setting");
-        if (!keys.twice().empty()) return badProfile(source.name, fmt::format("'{}' is there twice", keys.twice()));
+        if (!keys.twice().empty()) return isTwice(keys.twice(), source);
         if (root.is_object()) return root;
         return badProfile(source.name, fmt::format("a JSON object was expected, not {}", root.type_name()));
     } catch (const json::exception& error) {
@@ -97,6 +114,7 @@ Expected<Source> findSource(const std::string& name_or_file, const std::filesyst
     // Not what never ends, as pipes and devices do.
     const bool usable = std::filesystem::is_regular_file(path, ignored);
     std::ifstream file(usable ? path : std::filesystem::path(), std::ios::binary);
+    if (!file && usable) return fail(ErrorCode::Io, fmt::format("profile {}: it cannot be opened", path.string()));
     if (!file) {
         const auto shipped = shippedProfiles();
         const std::string_view nearest = nearestName(name_or_file, {shipped.begin(), shipped.end()});
@@ -108,12 +126,6 @@ Expected<Source> findSource(const std::string& name_or_file, const std::filesyst
     std::stringstream text;
     text << file.rdbuf();
     return Source{path.string(), path.filename().string(), path.parent_path(), text.str()};
-}
-
-std::string placeOf(const std::string& key, const Source& source) {
-    const auto lines = linesOfKeys(source.text);
-    const auto line = lines.find(key);
-    return line == lines.end() ? source.name : fmt::format("{}:{}", source.name, line->second);
 }
 
 Expected<void> apply(Profile& profile, const Source& source, int depth);
@@ -135,7 +147,7 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
     if (!root) return std::unexpected(root.error());
     if (auto ok = applyBase(profile, *root, source, depth); !ok) return ok;
     std::map<std::string, json> values;
-    flatten(*root, "", values);
+    if (const std::string twice = flatten(*root, "", values); !twice.empty()) return isTwice(twice, source);
     const auto settings = settingsOf(profile);
     for (const auto& [key, value] : values) {
         if (key == "extends") continue;
@@ -143,6 +155,7 @@ Expected<void> apply(Profile& profile, const Source& source, int depth) {
             if (value.is_string()) continue;
             return badProfile(placeOf(key, source), fmt::format("'{}' must be a text, not {}", key, value.type_name()));
         }
+        if (value.is_object() && isGroupOfSettings(key, settings)) continue;  // an empty one
         const auto assign = [&](const std::string& place) {
             return assignSetting(profile, settings, key, value, "profile " + place);
         };

@@ -85,8 +85,7 @@ std::vector<std::string> sortedWords(std::string_view key) {
 // "'lightmaps.page_sice' is no setting; did you mean 'lightmaps.page_size'?"
 std::string unknownKey(const std::string& key, const json& value, const std::vector<Setting>& settings) {
     if (key == "extends" || key == "description") return fmt::format("'{}' belongs in a profile's file", key);
-    const bool group = std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
-    if (group) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
+    if (isGroupOfSettings(key, settings)) return fmt::format("'{}' must be an object, not {}", key, value.type_name());
     std::vector<std::string_view> known = {"extends", "description"};
     for (const Setting& s : settings) known.push_back(s.key);
     std::string_view nearest = nearestName(key, known);
@@ -238,6 +237,11 @@ json valueOf(const Setting& setting) {
 
 double shortDecimal(float value) {
     return std::stod(fmt::format("{}", value));
+}
+
+bool isGroupOfSettings(const std::string& key, const std::vector<Setting>& settings) {
+    return key + "." == set_threshold_prefix ||
+           std::ranges::any_of(settings, [&](const Setting& s) { return s.key.starts_with(key + "."); });
 }
 
 Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& settings, const std::string& key,

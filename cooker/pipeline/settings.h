@@ -32,6 +32,9 @@ double shortDecimal(float value);
 // "records.thresholds.NAME" is a setting for every light set.
 inline constexpr std::string_view set_threshold_prefix = "records.thresholds.";
 
+// Whether `key` stands for several settings: an object in a profile.
+bool isGroupOfSettings(const std::string& key, const std::vector<Setting>& settings);
+
 // Sets one; `settings` are settingsOf(profile). `source` begins error messages: "profile mine.json:3", "--set", "the
 // level's 'dimmer_settings'".
 Expected<void> assignSetting(Profile& profile, const std::vector<Setting>& settings, const std::string& key,

@@ -274,7 +274,7 @@ class Report {
             if (!in || !png.starts_with("\x89PNG"))
                 return fail(
                     ErrorCode::Io,
-                    fmt::format("{}: there is no such heat map; write it by `dimmer verify --heatmap`", file.string()));
+                    fmt::format("{}: it is no heat map; write it by `dimmer verify --heatmap`", file.string()));
             body_ += fmt::format(
                 "<figure class=heat><img alt=\"error on page {}\" style=\"width:100%\" "
                 "src=\"data:image/png;base64,{}\"></figure>\n",

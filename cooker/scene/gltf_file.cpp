@@ -210,11 +210,14 @@ Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, ExternalFiles file
 
 Expected<Bytes> readFile(const std::filesystem::path& path) {
     std::error_code problem;
-    if (!std::filesystem::is_regular_file(path, problem))
+    const auto status = std::filesystem::status(path, problem);
+    if (status.type() == std::filesystem::file_type::none)
+        return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
+    if (!std::filesystem::is_regular_file(status))
         return fail(ErrorCode::Io,
                     fmt::format("{}: {}. Check the path.", path.string(),
-                                std::filesystem::exists(path, problem) ? "is a folder, a pipe or a device, and no file"
-                                                                       : "there is no such file"));
+                                std::filesystem::exists(status) ? "is a folder, a pipe or a device, and no file"
+                                                                : "there is no such file"));
     const uintmax_t size = std::filesystem::file_size(path, problem);
     if (problem) return fail(ErrorCode::Io, fmt::format("{}: {}.", path.string(), problem.message()));
     if (size > file_bytes_max)

@@ -61,7 +61,7 @@ Expected<LightProfiles::Profile> LightProfiles::read(const tinygltf::Value& sour
         return context_.error(label, "has neither a 'uri' nor a 'bufferView'. Export the level again.");
     }
     auto parsed = parseLightProfile({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, file);
-    if (!parsed) return std::unexpected(parsed.error());
+    if (!parsed) return context_.error(label, "its luminaire is not usable: " + parsed.error().message);
     for (const std::string& note : parsed->notes) context_.scene.warnings.push_back(note);
     return std::make_shared<const LightProfile>(std::move(parsed->profile));
 }

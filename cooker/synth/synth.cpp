@@ -35,11 +35,12 @@ float uniform(SynthRandom& random, float low, float high) {
     return low + (high - low) * (static_cast<float>(random() >> 8) * 0x1p-24f);
 }
 
-TexelRecord randomRecord(SynthRandom& random) {
+TexelRecord randomRecord(ColorFormat format, SynthRandom& random) {
     const float stored = std::exp2(uniform(random, -6.6f, 6.6f)) * exposure;
     const float r = uniform(random, 0.2f, 1), z = uniform(random, 0.3f, 1), angle = uniform(random, 0, 6.2831853f);
     const float across = std::sqrt(1 - z * z) / z * (1 - r);
-    return {encodeR11G11B10(stored, stored * uniform(random, 0.6f, 1), stored * uniform(random, 0.3f, 1)),
+    const float green = stored * uniform(random, 0.6f, 1), blue = stored * uniform(random, 0.3f, 1);
+    return {encodeColor(format, stored, green, blue),
             encodeDirection(1, r, across * std::cos(angle), across * std::sin(angle))};
 }
 
@@ -50,6 +51,7 @@ void addPages(const SynthOptions& options, PackData& pack) {
     pack.page_count = (rows + page_height_max - 1) / page_height_max;
     pack.page_height = (rows + pack.page_count - 1) / pack.page_count;
     pack.exposure = exposure;
+    pack.color_format = options.color_format;
 }
 
 void addElements(const SynthOptions& options, PackData& pack) {
@@ -109,13 +111,13 @@ void addRecords(SynthRandom& random, PackData& pack) {
     for (const Contribution& c : pack.contributions) first.push_back(first.back() + c.receivers);
     for (ClusterTerm& term : pack.terms) term.first_record += first[term.contribution];
     pack.payload.resize(first.back());
-    for (TexelRecord& record : pack.payload) record = randomRecord(random);
+    for (TexelRecord& record : pack.payload) record = randomRecord(pack.color_format, random);
     pack.base_pages.resize(size_t{pack.page_count} * pack.page_height * pack.page_width);
-    for (TexelRecord& record : pack.base_pages) record = randomRecord(random);
+    for (TexelRecord& record : pack.base_pages) record = randomRecord(pack.color_format, random);
 }
 
-ProbeRecord randomProbe(SynthRandom& random) {
-    ProbeRecord probe{.light = randomRecord(random).irradiance, .bands = {}};
+ProbeRecord randomProbe(ColorFormat format, SynthRandom& random) {
+    ProbeRecord probe{.light = randomRecord(format, random).irradiance, .bands = {}};
     for (uint32_t& word : probe.bands) word = static_cast<uint32_t>(random()) & 0x3f3f3f3fu;  // 0..63 of 127
     return probe;
 }
@@ -125,7 +127,7 @@ void addProbes(const SynthOptions& options, SynthRandom& random, PackData& pack)
     ProbeData& probes = pack.probes;
     const double count = (options.level.local_probes + options.level.global_probes) * options.scale;
     probes.base.resize(static_cast<size_t>(std::llround(count)));
-    for (ProbeRecord& probe : probes.base) probe = randomProbe(random);
+    for (ProbeRecord& probe : probes.base) probe = randomProbe(pack.color_format, random);
     probes.record_counts.assign(pack.contributions.size(), 0);
     const double share = count / static_cast<double>(pack.base_pages.size());
     double due = 0;
@@ -154,7 +156,7 @@ void addProbes(const SynthOptions& options, SynthRandom& random, PackData& pack)
     for (const uint32_t records : probes.record_counts) first.push_back(first.back() + records);
     for (ClusterTerm& term : probes.terms) term.first_record += first[term.contribution];
     probes.payload.resize(first.back());
-    for (ProbeRecord& record : probes.payload) record = randomProbe(random);
+    for (ProbeRecord& record : probes.payload) record = randomProbe(pack.color_format, random);
 }
 
 constexpr uint32_t storeys = 6;  // layers of the global grid: levels are wider than high

@@ -30,12 +30,14 @@ struct SynthOptions {
     uint32_t clusters = 1000;  // 1..100000; clusters without any contribution come on top
     uint32_t light_sets = 0;   // instead of the level's; 0: the level's
     uint32_t seed = 1;
+    ColorFormat color_format = ColorFormat::E5B9G9R9;
     bool probes = false;  // light probes as well, as many as the level has, in the clusters of the texels
 };
 
 // Clusters are the cells of a Voronoi diagram on the pages, of unequal sizes; each holds some of the sets
-// nearest to it, so that light sets and doors are coherent regions. Overlaps fall off geometrically (as in the paper's
-// figure 5) up to 16; their mean is the level's within 0.1 %. The same options give the same pack.
+// nearest to it, so that light sets and doors are coherent regions; where clusters are few, some sets have none.
+// Overlaps fall off geometrically (as in the paper's figure 5) up to 16; their mean is the level's within 0.1 %. The
+// same options give the same pack.
 Expected<PackData> synthesise(const SynthOptions& options);
 
 }  // namespace dimmer::cook

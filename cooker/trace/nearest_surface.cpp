@@ -1,6 +1,6 @@
 #include <trace/nearest_surface.h>
 
-#include <embree3/rtcore.h>
+#include <trace/embree_device.h>
 
 #include <algorithm>
 #include <cmath>
@@ -55,7 +55,7 @@ struct NearestSurface::Impl {
     std::span<const Mesh> meshes;
     glm::vec2 page_size;
     std::vector<Triangle> triangles;
-    RTCDevice device = rtcNewDevice(nullptr);
+    RTCDevice device = newEmbreeDevice();
     RTCScene scene = rtcNewScene(device);
 
     ~Impl() {

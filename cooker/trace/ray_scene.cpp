@@ -1,8 +1,7 @@
 #include <trace/ray_scene.h>
 
 #include <bake/sampling.h>
-
-#include <embree3/rtcore.h>
+#include <trace/embree_device.h>
 
 #include <algorithm>
 #include <cmath>
@@ -84,7 +83,7 @@ struct RayScene::Embree {
     template <class Object>
     using Handle = std::unique_ptr<std::remove_pointer_t<Object>, Release>;
 
-    Handle<RTCDevice> device{rtcNewDevice(nullptr)};
+    Handle<RTCDevice> device{newEmbreeDevice()};
     Handle<RTCScene> scene_owner{rtcNewScene(device.get())};
     RTCScene scene = scene_owner.get();
     const LevelTriangle* triangles;

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <limits>
 
 namespace dimmer {
@@ -17,8 +18,17 @@ constexpr uint32_t page_width = 2048;
 
 struct Variant {
     uint32_t workgroup_size, lane_stores;
+    bool one_stream;
 };
-constexpr std::array<Variant, 6> variants = {{{64, 1}, {256, 1}, {512, 1}, {64, 4}, {256, 4}, {512, 4}}};
+constexpr std::array<Variant, 8> variants = {{{64, 1, false},
+                                              {512, 1, false},
+                                              {64, 4, false},
+                                              {512, 4, false},
+                                              {64, 1, true},
+                                              {512, 1, true},
+                                              {64, 4, true},
+                                              {512, 4, true}}};
+constexpr int choosing_rounds = 6;
 
 struct Constants {
     uint32_t first, count, stride, page_width;
@@ -111,8 +121,8 @@ Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
     for (const Variant& variant : variants)
         for (const bool to_pages : {false, true})
             for (uint32_t loads = 1; loads <= loads_max; ++loads)
-                pipelines.push_back(
-                    {std::min(variant.workgroup_size, group_lanes_max_), loads, variant.lane_stores, to_pages});
+                pipelines.push_back({std::min(variant.workgroup_size, group_lanes_max_), loads, variant.lane_stores,
+                                     to_pages, variant.one_stream});
     const KernelBinding bindings[] = {
         KernelBinding::ofTexels(source_.view.get()), KernelBinding::ofBuffer(target_.buffer.get()),
         KernelBinding::ofImage(pages_[0].view.get()), KernelBinding::ofImage(pages_[1].view.get())};
@@ -158,21 +168,22 @@ Expected<double> CopyRoof::runVariant(size_t variant, CopyTarget target, uint64_
 }
 
 Expected<double> CopyRoof::run(CopyTarget target, uint64_t read_bytes, uint64_t written_bytes) {
-    auto& best = best_[target == CopyTarget::Pages];
-    if (!best) {
-        double best_us = std::numeric_limits<double>::infinity();
-        // Each twice more than the first time, which compiles.
-        for (size_t variant = 0; variant < variants.size(); ++variant)
-            for (int round = 0; round < 3; ++round) {
-                const auto us = runVariant(variant, target, read_bytes, written_bytes);
-                if (!us) return us;
-                if (round == 0 || *us >= best_us) continue;
-                best_us = *us;
-                best = variant;
-            }
-        if (!best) return 0.0;
-    }
-    return runVariant(*best, target, read_bytes, written_bytes);
+    const std::pair key(target, std::bit_width(written_bytes));
+    if (const auto known = best_.find(key); known != best_.end())
+        return runVariant(known->second, target, read_bytes, written_bytes);
+    double best_us = std::numeric_limits<double>::infinity();
+    size_t best = 0;
+    // In turns, as other programs take their share of a machine; the first round compiles.
+    for (int round = 0; round < choosing_rounds; ++round)
+        for (size_t variant = 0; variant < variants.size(); ++variant) {
+            const auto us = runVariant(variant, target, read_bytes, written_bytes);
+            if (!us) return us;
+            if (round == 0 || *us >= best_us) continue;
+            best_us = *us;
+            best = variant;
+        }
+    best_[key] = best;
+    return runVariant(best, target, read_bytes, written_bytes);
 }
 
 }  // namespace dimmer

@@ -5,7 +5,9 @@
 #include <gpu/transfer.h>
 #include <gpu/update_timer.h>
 
+#include <map>
 #include <optional>
+#include <utility>
 
 namespace dimmer {
 
@@ -19,8 +21,8 @@ class CopyRoof {
     // much as one buffer.
     static Expected<CopyRoof> create(const VulkanContext& vulkan, uint64_t read_bytes_max, uint64_t written_bytes_max);
 
-    // Microseconds of one copy; blocking. The kernel is the fastest of several workgroup sizes and of one or four
-    // stores per lane, found at the first call for a target.
+    // Microseconds of one copy; blocking. The kernel is the fastest of several workgroup sizes, of one or four stores
+    // per lane, and of loads from streams apart or from one; found anew for each size of copy and target.
     Expected<double> run(CopyTarget target, uint64_t read_bytes, uint64_t written_bytes);
 
    private:
@@ -39,7 +41,7 @@ class CopyRoof {
     GpuBuffer target_;
     Image pages_[2];
     std::optional<Kernel> kernel_;
-    std::optional<size_t> best_[2];  // per target
+    std::map<std::pair<CopyTarget, int>, size_t> best_;  // per target and bit width of the bytes that are written
     uint32_t groups_x_max_ = 0, group_lanes_max_ = 0;
 };
 

@@ -202,11 +202,24 @@ void Planner::touchAllPutOff() {
         if (waiting_[i].count == 0 && quantaPutOff(receivers_.clusters[i]) > limits_.tolerance_quanta) waitWhole(i);
 }
 
-// Up to so many receivers of a cluster's waiting batches become a part, one batch at least.
-void Planner::take(uint32_t cluster_index, uint32_t receivers) {
+// So many of a cluster's next waiting batches hold no more than `receivers`, which they are taken off; one in any case.
+uint32_t Planner::batchesWithin(uint32_t cluster_index, int64_t& receivers) const {
+    const Cluster& cluster = receivers_.clusters[cluster_index];
+    const Waiting& waiting = waiting_[cluster_index];
+    uint32_t batches = 0;
+    for (; batches < waiting.count; ++batches) {
+        const uint32_t next = cluster.first_batch + (waiting.first + batches) % cluster.batch_count;
+        const int64_t more = receivers_.batches[next].receiver_count;
+        if (batches > 0 && more > receivers) break;
+        receivers -= more;
+    }
+    return batches;
+}
+
+// The next so many of a cluster's waiting batches become a part.
+void Planner::take(uint32_t cluster_index, uint32_t batches) {
     const Cluster& cluster = receivers_.clusters[cluster_index];
     Waiting& waiting = waiting_[cluster_index];
-    const uint32_t batches = std::min(waiting.count, std::max(1u, receivers / batch_receivers_max));
     parts_.push_back({cluster_index, waiting.first, batches});
     waiting.first = (waiting.first + batches) % cluster.batch_count;
     waiting.plans = 0;
@@ -222,7 +235,7 @@ void Planner::take(uint32_t cluster_index, uint32_t receivers) {
 // In ascending order: neighbours on the pages are neighbours in memory. Through a bit per cluster, without sorting.
 void Planner::takeAll() {
     for (const uint32_t cluster : waiting_clusters_) mark(cluster);
-    visitMarked([&](uint32_t cluster) { take(cluster, UINT32_MAX); });
+    visitMarked([&](uint32_t cluster) { take(cluster, waiting_[cluster].count); });
     waiting_clusters_.clear();
 }
 
@@ -251,9 +264,7 @@ void Planner::takeWithin(uint32_t receivers) {
         std::ranges::pop_heap(urgent_, behind);
         const uint32_t cluster = urgent_.back().cluster;
         urgent_.pop_back();
-        const uint32_t before = waiting_[cluster].count;
-        take(cluster, static_cast<uint32_t>(std::max<int64_t>(left, 0)));
-        left -= int64_t{before - waiting_[cluster].count} * batch_receivers_max;
+        take(cluster, batchesWithin(cluster, left));
     }
     std::ranges::sort(parts_, {}, &Part::cluster);
     std::erase_if(waiting_clusters_, [&](uint32_t cluster) { return waiting_[cluster].count == 0; });

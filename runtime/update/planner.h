@@ -133,7 +133,8 @@ class Planner {
     void takeAll();
     static float urgency(const Waiting& waiting);
     void takeWithin(uint32_t receivers);
-    void take(uint32_t cluster, uint32_t receivers);
+    uint32_t batchesWithin(uint32_t cluster, int64_t& receivers) const;
+    void take(uint32_t cluster, uint32_t batches);
     void planPart(Part& part);
     void emitWork();
 

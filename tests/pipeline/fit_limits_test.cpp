@@ -17,7 +17,8 @@ PackData withGlobalProbes(size_t probes) {
 
 // One chart of 40 x 40 texels.
 LossTable oneChart(bool fixed) {
-    return LossTable(Baked{}, Texels{}, {}, 0, {.page_size = 64, .charts = {{40, 40}}, .fixed = {fixed}});
+    return LossTable(Baked{}, Texels{}, {}, 0,
+                     {.page_size = 64, .charts = {{40, 40}}, .fixed = {fixed}, .of_face = {}});
 }
 
 // 128 kB of 50, of which a grid of 28 kB can save only a part.

@@ -86,9 +86,14 @@ TEST(Profile, UnknownKeysAreNamedWithTheNearest) {
     expectBad(R"({"extend": "desktop"})", {"'extend'", "did you mean 'extends'?"});
     expectBad(R"({"records": {"max_overlap": 8}})", {"did you mean 'records.overlap_max'?"});
     expectBad(R"({"grids": {"max_probes": 8}})", {"did you mean 'grids.probes_max'?"});
-    expectBad("{\"records\": {\"threshold\": 0.1,\n\"threshold\": 0.2}}", {"'threshold' is there twice"});
+    expectBad("{\"records\": {\"threshold\": 0.1,\n\"threshold\": 0.2}}", {":2: 'records.threshold' is there twice"});
+    expectBad("{\"records.threshold\": 0.1,\n\"records\": {\n\"threshold\": 0.2}}",
+              {":3: 'records.threshold' is there twice"});
+    expectBad("{\n\"bugdets\": {}}", {":2: 'bugdets' is no setting"});
+    expectBad(R"({"kernels": {}})", {"'kernels' is no setting"});
     expectBad("{\n\"extends\": \"no such\"}", {":2: ", "'extends'", "no such"});
     expectBad(R"({"description": 5})", {"'description' must be a text"});
+    expectBad(R"({"description": {}})", {"'description' must be a text"});
     expectBad(R"({"$schema": null})", {"'$schema' must be a text"});
     expectBad(R"({"zzzzzzzz": 1})", {"'zzzzzzzz' is no setting; there are: ", "budgets.total", "bake.final.tolerance"});
     expectBad(R"({"bake": {"draft": {"rays": {"deep": {"er": 1}}}}})", {"nests deeper"});
@@ -100,6 +105,8 @@ TEST(Profile, WrongTypes) {
     expectBad(R"({"records": {"threshold": [1]}})", {"'records.threshold' must be a number"});
     expectBad(R"({"lightmaps": {"page_size": 512.5}})", {"'lightmaps.page_size' is 512.5", "whole number"});
     expectBad(R"({"lightmaps": 4})", {"'lightmaps' must be an object, not number"});
+    expectBad(R"({"lightmaps": {"page_size": {}}})", {"'lightmaps.page_size' must be a number"});
+    expectBad(R"({"records": {"thresholds": 3}})", {"'records.thresholds' must be an object, not number"});
     expectBad(R"({"extends": 3})", {"'extends' must be"});
 }
 

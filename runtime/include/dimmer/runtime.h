@@ -46,11 +46,12 @@ enum class Buffering {
 struct RuntimeOptions {
     UpdateMode mode = UpdateMode::WorkList;
     Buffering buffering = Buffering::InPlace;
-    // Device memory for records, in bytes; 0: room for all. Less needs load_records = false: then light sets are loaded
-    // and dropped as the game moves on.
+    // Device memory for texels' records, in bytes; 0: room for all. Less needs load_records = false: then light sets
+    // are loaded and dropped as the game moves on.
     uint64_t records_bytes_max = 0;
     // Load every light set's records in create(). False: none (each set is held at 0 until loadRecords() brings them);
-    // always-on light that doors let through is loaded in any case.
+    // always-on light that doors let through is loaded in any case. Light probes' records, a fraction of all, are
+    // always there: what moves through a level asks for any of them at any time.
     bool load_records = true;
     // Room for the probes of moving models (LightState::addModel), in probes, up to moving_probes_limit; each model
     // takes a multiple of 8 of them in a row. 0, or a pack without a global light grid: no models, and nothing is kept
