@@ -209,8 +209,10 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
     c->add_flag("--formats", a->options.formats, "what each colour format and directional model would cost here");
     c->add_option("--max-error", a->max_error,
                   "exit with 4 when the mean error at surfaces is above, e.g. 0.1 for 10 %")
-        ->check(CLI::NonNegativeNumber)
-        ->check(refuseNotFinite);
+        ->check(refuseNotFinite)
+        ->check([](const std::string& text) {
+            return text.starts_with('-') ? "a share of 0 or more is due, not " + text : std::string();
+        });
     c->add_option("--heatmap", a->heatmap,
                   "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
     c->add_option("--csv", a->csv,

@@ -86,7 +86,8 @@ struct BakedGrid {
 struct DoorPair {
     uint32_t first = 0, second = 0;  // into Scene::doors
     // What is off without the combination while both are open, at most: luminous flux over paths that need one open and
-    // ask how the other stands, over all that opening the lesser of the two alone changes.
+    // ask how the other stands, over all that opening the lesser of the two alone changes; infinite where that is
+    // nothing.
     float loss = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <bake/series.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -29,24 +30,32 @@ BakeSettings few(BakeSettings settings, size_t texels) {
     return settings;
 }
 
-bool covered(const Scene& scene, const DoorIndices& pair) {
+// Whether a combination keeps the pair's light of a group.
+bool covered(const Scene& scene, const DoorIndices& pair, uint32_t group) {
     return std::ranges::any_of(scene.combinations, [&](const std::vector<ElementRef>& combination) {
         const auto names = [&](uint32_t door) {
             return std::ranges::any_of(combination, [&](const ElementRef& e) { return e.is_door && e.index == door; });
         };
-        const bool any_set = std::ranges::any_of(combination, [](const ElementRef& e) { return !e.is_door; });
-        return !any_set && names(pair.first) && names(pair.second);
+        const auto set = std::ranges::find(combination, false, &ElementRef::is_door);
+        const bool of_group = set == combination.end() || groupOf(set->index) == group;
+        return of_group && names(pair.first) && names(pair.second);
     });
 }
 
-std::set<DoorIndices> seenTogether(const Scene& scene, const Sparse<uint32_t>& doors_seen) {
+bool coveredForAll(const Scene& scene, const DoorIndices& pair, uint32_t groups) {
+    for (uint32_t g = 0; g < groups; ++g)
+        if (!covered(scene, pair, g)) return false;
+    return true;
+}
+
+std::set<DoorIndices> seenTogether(const Scene& scene, const Sparse<uint32_t>& doors_seen, uint32_t groups) {
     std::set<DoorIndices> pairs;
     for (size_t i = 0; i < doors_seen.rows(); ++i) {
         const auto row = doors_seen.row(i);  // ascending
         for (size_t a = 0; a < row.size(); ++a)
             for (size_t b = a + 1; b < row.size(); ++b) pairs.insert({row[a], row[b]});
     }
-    std::erase_if(pairs, [&](const DoorIndices& pair) { return covered(scene, pair); });
+    std::erase_if(pairs, [&](const DoorIndices& pair) { return coveredForAll(scene, pair, groups); });
     return pairs;
 }
 
@@ -130,8 +139,9 @@ std::vector<DoorIndices> doorsInSight(const RayScene& rays) {
 
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
                                std::span<const uint8_t> groups, Progress& progress, RayEnds* links) {
-    Scene named = gatherer.rays().scene();
-    const auto pairs = seenTogether(named, series.doors_seen);
+    const Scene& scene = gatherer.rays().scene();
+    Scene named = scene;
+    const auto pairs = seenTogether(scene, series.doors_seen, gatherer.paths().groupCount());
     std::vector<DoorFlux> flux(groups.size());
     if (pairs.empty()) return flux;
     for (const DoorIndices& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
@@ -153,7 +163,8 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
             if (term.doors_open.empty() || term.doors_open == std::vector{door}) f.alone[door] += energy;
         if (doors.size() != 2 || term.doors_open.empty()) continue;
         const auto pair = pairs.find({doors[0], doors[1]});
-        if (pair != pairs.end()) f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += energy;
+        if (pair != pairs.end() && !covered(scene, *pair, term.group))
+            f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += energy;
     }
     return flux;
 }
@@ -170,9 +181,11 @@ std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeS
     for (size_t p = 0; !flux.empty() && p < flux[0].pairs.size(); ++p) {
         const uint32_t first = flux[0].pairs[p].first, second = flux[0].pairs[p].second;
         const auto alone = [&](uint32_t door) { return sum([&](const DoorFlux& f) { return f.alone[door]; }); };
-        const double less = std::min(alone(first), alone(second));
+        const auto [less, more] = std::minmax({alone(first), alone(second)});
         const double off = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
-        const auto loss = static_cast<float>(less > 0 ? off / less : 0);
+        // Behind one door in a row with another there may be no light at all but through both.
+        const bool all = !(less > 0) && off > static_cast<double>(settings.threshold) * more;
+        const auto loss = all ? INFINITY : static_cast<float>(less > 0 ? off / less : 0);
         if (loss > settings.threshold) found.push_back({first, second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);

@@ -64,10 +64,11 @@ class Grid {
 
 CoarserTexels::CoarserTexels(const Texels& texels, std::span<const uint32_t> face_chart, const std::vector<bool>& fixed,
                              std::span<const float> lux, float floor_lux)
-    : floor_lux_(floor_lux), texels_(texels.size()) {
+    : floor_lux_(floor_lux) {
     std::vector<std::vector<uint32_t>> of_chart(fixed.size());
     for (uint32_t i = 0; i < texels.size(); ++i) {
         const uint32_t chart = face_chart[texels.sample(i, 0).face];
+        all_m2_ += static_cast<double>(texels.area_m2[i]);
         if (!fixed[chart]) of_chart[chart].push_back(i);
     }
     first_.push_back(0);
@@ -80,6 +81,7 @@ CoarserTexels::CoarserTexels(const Texels& texels, std::span<const uint32_t> fac
             places_.push_back({static_cast<uint16_t>(TexelAddress::x(texels.address[i]) - low.x),
                                static_cast<uint16_t>(TexelAddress::y(texels.address[i]) - low.y)});
             lux_.push_back(lux[i]);
+            area_m2_.push_back(texels.area_m2[i]);
         }
         first_.push_back(static_cast<uint32_t>(places_.size()));
     }
@@ -99,17 +101,18 @@ double CoarserTexels::errorOf(size_t chart, double factor) const {
     double sum = 0;
     for (size_t i = begin; i < end; ++i) {
         const float above = lux_[i] + floor_lux_;
-        if (above > 0) sum += static_cast<double>(std::abs(cells.shownAt(middle(i)) - lux_[i]) / above);
+        const float lost = std::abs(cells.shownAt(middle(i)) - lux_[i]);
+        if (above > 0) sum += static_cast<double>(area_m2_[i] * lost / above);
     }
     return sum;
 }
 
 double CoarserTexels::error(double factor) const {
-    if (texels_ == 0) return 0;
+    if (!(all_m2_ > 0)) return 0;
     const Sums sum = sumOverRows(first_.size() - 1, Sums(1), [&](size_t begin, size_t end, Sums& part) {
         for (size_t chart = begin; chart < end; ++chart) part.of[0] += errorOf(chart, factor);
     });
-    return sum.of[0] / static_cast<double>(texels_);
+    return sum.of[0] / all_m2_;
 }
 
 }  // namespace dimmer::cook

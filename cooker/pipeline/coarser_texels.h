@@ -22,7 +22,7 @@ class CoarserTexels {
     CoarserTexels(const Texels& texels, std::span<const uint32_t> face_chart, const std::vector<bool>& fixed,
                   std::span<const float> lux, float floor_lux);
 
-    // Mean over all texels, `factor` times as long (1 or more). Linear in texels; deterministic.
+    // Mean over the surface of all texels, `factor` times as long (1 or more). Linear in texels; deterministic.
     double error(double factor) const;
 
    private:
@@ -33,9 +33,9 @@ class CoarserTexels {
     };
     std::vector<uint32_t> first_;  // per chart that is not fixed, and one more
     std::vector<Place> places_;    // chart by chart
-    std::vector<float> lux_;
+    std::vector<float> lux_, area_m2_;
     float floor_lux_ = 0;
-    size_t texels_ = 0;  // those of fixed charts, too
+    double all_m2_ = 0;  // with fixed charts
 };
 
 }  // namespace dimmer::cook

@@ -9,6 +9,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 namespace dimmer::cook {
 namespace {
 
@@ -57,6 +59,8 @@ void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats
         stats.warnings.push_back(fmt::format("{}: light set '{}' {}", scene.file, scene.light_sets[term.group - 1].name,
                                              arrives ? below : "reaches no surface; it is kept, and does nothing"));
     }
+    // What is lit through two doors alone is told with the pair.
+    for (const DoorPair& pair : baked.dependent_doors) used[pair.first] = used[pair.second] = true;
     for (uint32_t d = 0; d < used.size(); ++d)
         if (!used[d])
             stats.warnings.push_back(fmt::format("{}: door '{}' {}", scene.file, scene.doors[d].name,
@@ -68,11 +72,15 @@ void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& sta
         const std::string first = "door:" + scene.doors[pair.first].name,
                           second = "door:" + scene.doors[pair.second].name;
         stats.suggested_combinations.emplace_back(first, second);
+        const std::string what =
+            std::isinf(pair.loss)
+                ? "light that comes through both alone is missing while both are open"
+                : fmt::format("up to {:.0f} % of the light that the lesser of them moves is off while both are open",
+                              100 * static_cast<double>(pair.loss));
         stats.warnings.push_back(
-            fmt::format("{}: '{}' and '{}' depend on each other: up to {:.0f} % of the light that the lesser of them "
-                        "moves is off while both are open; name [\"{}\", \"{}\"] in the scene's 'dimmer_combinations' "
-                        "(--suggest-combinations prints the list)",
-                        scene.file, first, second, 100 * static_cast<double>(pair.loss), first, second));
+            fmt::format("{}: '{}' and '{}' depend on each other: {}; name [\"{}\", \"{}\"] in the scene's "
+                        "'dimmer_combinations' (--suggest-combinations prints the list)",
+                        scene.file, first, second, what, first, second));
     }
 }
 

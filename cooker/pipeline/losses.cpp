@@ -42,13 +42,13 @@ struct LossTable::StateLight {
     float floor_lux = 0;
 
     explicit StateLight(size_t receivers) : lux(receivers) {}
-    void setFloor(const std::vector<uint32_t>& copies) {
-        double sum = 0, count = 0;
+    void setFloor(const std::vector<float>& area_m2) {
+        double sum = 0, area = 0;
         for (size_t i = 0; i < lux.size(); ++i) {
-            sum += static_cast<double>(lux[i]) * copies[i];
-            count += copies[i];
+            sum += static_cast<double>(lux[i] * area_m2[i]);
+            area += static_cast<double>(area_m2[i]);
         }
-        floor_lux = static_cast<float>(floor_share * sum / std::max(count, 1.0));
+        floor_lux = static_cast<float>(area > 0 ? floor_share * sum / area : 0);
     }
     double above(size_t i) const { return static_cast<double>(lux[i] + floor_lux); }
 };
@@ -99,7 +99,7 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
         for (const ReceiverLight& l : baked.light.row(i))
             if (l.term == always_group) add(i, l.term, luminance(l.light.irradiance()));
     forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t k) { add(r.receiver, r.term, lux[k]); });
-    for (StateLight& state : states) state.setFloor(copies_);
+    for (StateLight& state : states) state.setFloor(texels.area_m2);
     weigh(texels, lux, states);
     coarser_ = CoarserTexels(texels, sizes_.of_face, sizes_.fixed, states[0].lux, states[0].floor_lux);
 }
@@ -136,8 +136,8 @@ void LossTable::forKept(const Rungs& rungs, auto&& each) const {
 }
 
 void LossTable::weigh(const Texels& texels, std::span<const float> lux, std::span<const StateLight> states) {
-    double texel_count = 0;
-    for (const uint32_t copies : copies_) texel_count += copies;
+    double area_m2 = 0;
+    for (const float texel_m2 : texels.area_m2) area_m2 += static_cast<double>(texel_m2);
     std::vector<double> energy(groupCount());
     const auto energyOf = [&](const Record& r, size_t k) {
         return static_cast<double>(lux[k] * texels.area_m2[r.receiver]);
@@ -148,8 +148,8 @@ void LossTable::weigh(const Texels& texels, std::span<const float> lux, std::spa
         double error = 0;
         for (const bool open : {false, true})
             if (const StateLight& state = states[open]; isLit(terms_[r.term], open) && state.above(r.receiver) > 0)
-                error +=
-                    static_cast<double>(lux[k]) / state.above(r.receiver) * copies_[r.receiver] / (2 * texel_count);
+                error += static_cast<double>(lux[k] * texels.area_m2[r.receiver]) /
+                         (state.above(r.receiver) * 2 * std::max(area_m2, 1e-30));
         r.error = static_cast<float>(error);
         if (const double all = energy[groupOf(r)]; all > 0) r.energy = static_cast<float>(energyOf(r, k) / all);
     }

@@ -22,7 +22,7 @@ using Rungs = std::vector<uint8_t>;
 
 struct Loss {
     uint64_t bytes = 0;  // of records; not the bases of receivers that keep none
-    double error = 0;    // mean over receivers of the light that is lost over the light there, in luminance
+    double error = 0;    // mean over surfaces of the light that is lost over the light there, in luminance
     double energy = 0;   // share of the groups' stored light
 };
 
@@ -60,9 +60,9 @@ class LossSteps {
 };
 
 // Records of a bake by the rung at which they go. Of those that are left, a receiver keeps as many as it may hold, the
-// brightest: where one goes, another may come back. A receiver counts once for every texel that shows it. Errors are
-// those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of that
-// 1 %.
+// brightest: where one goes, another may come back. A receiver's bytes count once for every texel that shows it. Errors
+// are those of all sets at weight 1, the mean of all doors open and all closed; below 1 % of the mean light, shares of
+// that 1 %.
 class LossTable {
    public:
     LossTable() = default;

@@ -272,9 +272,8 @@ class Report {
             std::ifstream in(usable ? file : std::filesystem::path(), std::ios::binary);
             const std::string png{std::istreambuf_iterator<char>(in), {}};
             if (!in || !png.starts_with("\x89PNG"))
-                return fail(
-                    ErrorCode::Io,
-                    fmt::format("{}: it is no heat map; write it by `dimmer verify --heatmap`", file.string()));
+                return fail(ErrorCode::Io,
+                            fmt::format("{}: it is no heat map; write it by `dimmer verify --heatmap`", file.string()));
             body_ += fmt::format(
                 "<figure class=heat><img alt=\"error on page {}\" style=\"width:100%\" "
                 "src=\"data:image/png;base64,{}\"></figure>\n",

@@ -6,6 +6,9 @@
 
 namespace dimmer::cook {
 
+// Of one combination: each may be open, closed or either, so that a light group has 3^8 = 6561 paths of them.
+constexpr std::ptrdiff_t combined_doors_max = 8;
+
 Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
     const auto name = extras.text("dimmer_light_set");
     if (!name) return std::unexpected(name.error());
@@ -124,6 +127,13 @@ Expected<void> Elements::combination(const tinygltf::Value& list) {
         return context_.error("'dimmer_combinations'",
                               "one combination names two light sets. The light of two sets simply "
                               "adds up: name at most one set with the doors.");
+    const auto doors = std::ranges::count(combination, true, &ElementRef::is_door);
+    if (doors > combined_doors_max)
+        return context_.error("'dimmer_combinations'",
+                              fmt::format("one combination names {} doors, whose light is kept for every way in which "
+                                          "each is open, closed or either; {} are the most. Name fewer, or several "
+                                          "combinations of those that see one another.",
+                                          doors, combined_doors_max));
     context_.scene.combinations.push_back(std::move(combination));
     return {};
 }

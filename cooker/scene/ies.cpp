@@ -78,6 +78,14 @@ class Reader {
         return ok() ? static_cast<int>(value) : 0;
     }
 
+    // But for the end-of-file mark of old systems. Numbers that are left mean that a count is wrong.
+    void expectEnd(std::string_view what) {
+        const std::string_view token = nextToken();
+        if (!token.empty() && token != "\x1a")
+            refuse(token_line_,
+                   fmt::format("'{:.20}' follows {}. Correct the numbers of angles, or remove it.", token, what));
+    }
+
     // The line of the last number read.
     int numberLine() const { return token_line_; }
 
@@ -135,6 +143,8 @@ class Parser {
                                                  {"IESNA:LM-63-2002", Standard::Lm2002},
                                                  {"IES:LM-63-2019", Standard::Lm2019}}};
         tilt_ = in_.nextLine();
+        constexpr std::string_view byte_order_mark = "\xef\xbb\xbf";
+        if (tilt_.starts_with(byte_order_mark)) tilt_.remove_prefix(byte_order_mark.size());
         if (const auto* const it = std::ranges::find(known, tilt_, &Known::line); it != known.end())
             standard_ = it->standard;
         else if (tilt_.starts_with("IES"))
@@ -230,6 +240,7 @@ class Parser {
         const size_t wanted = static_cast<size_t>(verticals_) * static_cast<size_t>(horizontals_);
         std::vector<double> values;
         while (values.size() < wanted && in_.ok()) values.push_back(in_.number("a candela value", 0, any_number));
+        if (in_.ok()) in_.expectEnd("the last candela value");
         if (!in_.ok()) return;
         const double peak = *std::ranges::max_element(values);
         LightProfile& p = out_.profile;

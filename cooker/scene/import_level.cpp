@@ -96,6 +96,9 @@ class LevelImporter {
         }
         if (node.mesh >= 0 && !*play_area)
             if (const auto ok = mesh(at, extras, owner); !ok) return ok;
+        if (shines && door_of_node_[static_cast<size_t>(at.node)].door)
+            context_.warn(owner,
+                          "is a lamp below a door; lamps do not move with doors, and it shines from where it is.");
         if (shines)
             if (const auto ok = this->light(at, light, of_light); !ok) return ok;
         if (node.mesh < 0 && !shines)

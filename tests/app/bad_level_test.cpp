@@ -120,6 +120,19 @@ TEST_F(Cooks, RefusesWhatCannotBeUsed) {
              l.document["scenes"][0]["extras"]["dimmer_combinations"] = json::array({json::array({"hal", "door:x"})});
          },
          {"dimmer_combinations", "'hal'"}},
+        {"combination of too many doors",
+         [](LevelFile& l) {
+             json names = json::array();
+             for (int d = 0; d < 9; ++d) {
+                 l.addNode({{"name", "leaf"},
+                            {"mesh", l.addSquareMesh(0)},
+                            {"translation", {0, 0.1 * d, 0}},
+                            {"extras", {{"dimmer_door", "d" + std::to_string(d)}}}});
+                 names.push_back("door:d" + std::to_string(d));
+             }
+             l.document["scenes"][0]["extras"]["dimmer_combinations"] = json::array({names});
+         },
+         {"dimmer_combinations", "names 9 doors", "8 are the most"}},
         {"required extension",
          [](LevelFile& l) { l.document["extensionsRequired"] = {"KHR_draco_mesh_compression"}; },
          {"KHR_draco_mesh_compression"}},
@@ -176,6 +189,29 @@ TEST_F(Cooks, WarnsOfWhatIsSuspicious) {
                         {"extras", {{"dimmer_door", "far"}}}});
          },
          {"door 'far' changes no light; it is kept, and does nothing"}},
+        {"a door that changes light by less than its threshold",
+         [](LevelFile& l) {
+             l.addNode({{"name", "leaf"},
+                        {"mesh", l.addSquareMesh(0)},
+                        {"translation", {0, 0.5f, 0}},
+                        {"rotation", {1, 0, 0, 0}},  // facing the floor, whose light it sends back
+                        {"scale", {0.2f, 0.2f, 0.2f}},
+                        {"extras", {{"dimmer_door", "small"}}}});
+             l.document["scenes"][0]["extras"]["dimmer_settings"] = "records.threshold=1";
+         },
+         {"door 'small' changes light by less than its activity threshold everywhere", "Lower 'records.threshold'"}},
+        {"a lamp below a door",
+         [](LevelFile& l) {
+             const int leaf = l.addNode({{"name", "leaf"},
+                                         {"mesh", l.addSquareMesh(0)},
+                                         {"translation", {0, 0.5f, 0}},
+                                         {"extras", {{"dimmer_door", "moves"}}}});
+             const int lantern = l.addLight("lantern", {{"type", "point"}, {"intensity", 5}}, {});
+             l.node(leaf)["children"] = {lantern};
+             auto& roots = l.document["scenes"][0]["nodes"];
+             roots.erase(std::ranges::find(roots, json(lantern)));
+         },
+         {"node 'lantern'", "lamps do not move with doors"}},
         {"a set that lights nothing",
          [](LevelFile& l) {
              const int lost = l.addLight("lost", {{"type", "point"}, {"intensity", 5}}, {{"dimmer_light_set", "void"}});

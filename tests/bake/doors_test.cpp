@@ -299,23 +299,6 @@ TEST(Doors, EveryStateIsExactWithAllTermsKept) {
     printf("32 states: worst sum off by %.2f %%, mean absolute difference %.2f %%\n", 100 * worst, 100 * absolute);
 }
 
-TEST(Doors, ClosedIsTheBaseAndWhatClosedLeavesReflect) {
-    BakedScene b(corridor());
-    b.bake({.series_rays = 32, .final_rays = 64, .emitter_samples = 2});
-    uint64_t crossed = 0, reflected = 0;
-    for (size_t i = 0; i < b.texels.size(); ++i) {
-        glm::dvec3 sum(0);
-        for (const ReceiverLight& l : b.baked.light.row(i)) {
-            crossed += !b.baked.terms[l.term].doors_open.empty();
-            reflected += !b.baked.terms[l.term].doors_closed.empty();
-            if (b.baked.terms[l.term].doors_open.empty()) sum += glm::dvec3(l.light.irradiance_lux);
-        }
-        EXPECT_EQ(inState(b, i, 0, 3), sum) << i;
-    }
-    EXPECT_GT(crossed, b.texels.size() / 4);
-    EXPECT_GT(reflected, b.texels.size() / 4);
-}
-
 // Without combinations, with all doors closed and with any one open, the light of a state is all there.
 TEST(Doors, OneOpenDoorIsExactWhereTheOthersAreClosed) {
     const Scene scene = corridor();
@@ -443,6 +426,33 @@ TEST(Doors, PairsThatDependOnEachOtherAreFound) {
     const DoorPair& first = pairs[0].first == 0 ? pairs[0] : pairs[1];
     // Few rays against many: a tenth.
     EXPECT_NEAR(static_cast<double>(first.loss) / (off / std::min(alone[0], alone[1])), 1, 0.1);
+}
+
+// Three rooms in a row, lit in the first alone: the second door by itself changes nothing, and the last room is black
+// unless the two are named.
+TEST(Doors, APairIsFoundWhereOneOfThemAloneChangesNothing) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addBox(scene, {3, 1, 1}, white);
+    scene.doors = {{"a", false}, {"b", false}};
+    for (uint32_t d = 0; d < 2; ++d)
+        addSolid(scene, "leaf", {-1 + 2 * static_cast<float>(d), 0, 0}, {0.1f, 1, 1}, white, d);
+    scene.light_sets = {{"lamp", 1}, {"other", 1}};
+    for (uint32_t set : {0u, 1u})
+        addPointLight(scene, {-2.2f, 0.2f, 0.1f + 0.3f * static_cast<float>(set)}, 100, BakeMode::Full).light_set = set;
+    const auto found = [](const Scene& level) {
+        BakedScene b(level);
+        b.bake({.series_rays = 32, .final_rays = 1});
+        return b.baked.dependent_doors;
+    };
+    const auto pairs = found(scene);
+    ASSERT_EQ(pairs.size(), 1u);
+    EXPECT_TRUE(pairs[0].first == 0 && pairs[0].second == 1 && std::isinf(pairs[0].loss));
+    // Named for one set, the other's light is still missing; for both, all is there.
+    scene.combinations = {{{true, 0}, {true, 1}, {false, 0}}};
+    EXPECT_EQ(found(scene).size(), 1u);
+    scene.combinations.push_back({{true, 0}, {true, 1}, {false, 1}});
+    EXPECT_TRUE(found(scene).empty());
 }
 
 // Naming a pair splits the light of one open door into more and fainter terms, each with a threshold of its own. Where

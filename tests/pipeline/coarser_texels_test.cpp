@@ -15,6 +15,7 @@ Texels oneChart() {
         texels.address.push_back(TexelAddress::pack(0, 16 + i % width, 24 + i / width));
         texels.first_sample.push_back(i);
         texels.samples.push_back({});
+        texels.area_m2.push_back(0.25f);
     }
     texels.first_sample.push_back(width * height);
     return texels;

@@ -68,6 +68,13 @@ TEST(SceneIesFile, AllFiveHeaders) {
     }
 }
 
+// Some editors begin a file with a byte-order mark, and old systems end it with a mark of its end.
+TEST(SceneIesFile, MarksAreNoPartOfIt) {
+    Ies ies;
+    ies.second = 0.5;
+    EXPECT_NEAR(candelaAt(parsed("\xef\xbb\xbf" + ies.text() + "\n\x1a"), 0, 0), 100, tolerance_cd);
+}
+
 TEST(SceneIesFile, FactorsMultiplyAndOutsideIsDark) {
     Ies ies;
     ies.multiplier = 3;
@@ -204,6 +211,7 @@ TEST(SceneIesFile, BadFilesAreRefusedWithTheirLine) {
         {"one other", [](Ies& i) { i.horizontal = {30}; }, "lamp.ies:7: horizontal angles"},
         {"negative", [](Ies& i) { i.candela[1] = -5; }, "lamp.ies:8: a candela value"},
         {"too few", [](Ies& i) { i.candela.pop_back(); }, "lamp.ies:8: the file ends"},
+        {"too many values", [](Ies& i) { i.candela.push_back(5); }, "lamp.ies:8: '5' follows the last candela value"},
         {"too many angles", [](Ies& i) { i.vertical.resize(5000); }, "the number of vertical angles is 5000"},
     };
     for (const Bad& b : bad) {
