@@ -164,8 +164,8 @@ TEST_F(Fit, TheHousesDensityWithTheErrorThatWasPredicted) {
     const double error = errorAtPoints(level, folder.path / "level.dimmer", folder.path / "whole.dimmer");
     double predicted = 0;
     for (const Remedy& remedy : fitted->fitted) predicted += remedy.error;
-    printf("density %.2f: predicted %.2f %%, measured %.2f %%\n",
-           static_cast<double>(fitted->profile.texels_per_metre), 100 * predicted, 100 * error);
+    printf("density %.2f: predicted %.2f %%, measured %.2f %%\n", static_cast<double>(fitted->profile.texels_per_metre),
+           100 * predicted, 100 * error);
     EXPECT_GT(error, predicted / 1.5);
     EXPECT_LT(error, predicted * 1.5);
 }
