@@ -23,6 +23,8 @@ PAGE = ROOT / "docs/measurements.md"
 DIMMER = str((ROOT / os.environ.get("DIMMER_BIN", "build/bin") / "dimmer").resolve())
 HOUSE = ROOT / "game_sample/levels/house.gltf"
 HOUSE_PROFILE = ROOT / "game_sample/house_profile.json"
+HOUSE_STATES = {"all on": "", "all off": "all=0", "alarm and desk": "all=0,alarm=1/0.2/0.2,desk=0.5",
+                "half, den open": "all=0.5,door:den=1", "front open": "all=0,door:front=1"}
 CAUSES = ["noise", "series_expansion", "texel_size", "activity_threshold", "colour_format", "directional_model"]
 NORMAL_MEAN, NORMAL_P95 = math.sqrt(2 / math.pi), 1.959964  # magnitude of a standard normal number
 
@@ -177,6 +179,22 @@ def verify_tables(levels, quality, points, paths, folder):
             table(["level", "stored as", "1 set: mean, 95 %", "3 sets", "8 sets"], formats))
 
 
+def states_table(points, paths, folder):
+    """The house at final in several states of its sets and doors."""
+    rows = []
+    for name, profile in (("house", "desktop"), ("house, own profile", HOUSE_PROFILE)):
+        pack, report = folder / "states.dimmer", folder / "states.json"
+        dimmer("cook", HOUSE, "-o", pack, "--quality", "final", "--profile", profile, "--set", "grids.global=off")
+        for state, text in HOUSE_STATES.items():
+            dimmer("verify", HOUSE, pack, "--points", points, "--paths", paths, "--no-sets", "--state", text, "--json",
+                   report)
+            f = json.loads(report.read_text())["surface"]
+            rows.append([name, state, str(f["points"]), percent(f["mean"]), percent(f["p95"]),
+                         f"{100 * f['bias']:+.2f} %", percent(f["reference_relative_standard_error"])])
+            print(*rows[-1], flush=True)
+    return table(["level", "state", "points", "mean", "95th percentile", "bias", "reference error"], rows)
+
+
 def openings_table(points, paths, folder):
     """What opening each door of the house does, at final and 8 texels per metre: as it is and without combinations."""
     rows = []
@@ -305,7 +323,8 @@ def main():
     parser.add_argument("--paths", type=int, default=4096, help="per point, reference against truth")
     parser.add_argument("--points", type=int, default=500, help="verify's random points")
     parser.add_argument("--verify-paths", type=int, default=16384, help="per point, at most")
-    parser.add_argument("--only", choices=["reference", "packs", "verify", "sets", "doors", "openings"], help="one part of it")
+    parser.add_argument("--only", help="one part of it",
+                        choices=["reference", "packs", "verify", "states", "sets", "doors", "openings"])
     parser.add_argument("--runs", type=int, default=3, help="cooks of each kind, of which the median counts")
     options = parser.parse_args()
     levels = [name for name in options.levels if (LEVELS / f"{name}.glb").exists() and TRUTH.exists()]
@@ -325,6 +344,9 @@ def main():
         if options.only in (None, "openings"):
             refresh("openings", lambda: part("openings", *paths)
                     + openings_table(options.points, options.verify_paths, folder))
+        if options.only in (None, "states"):
+            refresh("states", lambda: part("states", *paths)
+                    + states_table(options.points, options.verify_paths, folder))
         if levels and options.only in (None, "reference"):
             refresh("reference", lambda: part("reference", f"--paths {options.paths}")
                     + reference_table(levels, options.paths, folder))

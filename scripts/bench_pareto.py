@@ -15,7 +15,7 @@ import statistics
 import sys
 import time
 
-from bench_bake import HOUSE, LEVELS, ROOT, TRUTH, dimmer, light_error, luminance, read, refresh, table
+from bench_bake import HOUSE, HOUSE_STATES, LEVELS, ROOT, TRUTH, dimmer, light_error, luminance, read, refresh, table
 from pareto_report import front, report
 
 OUT = ROOT / "out/pareto"
@@ -28,8 +28,6 @@ AXES = {
 }
 # The grid's density touches no texel: it is one axis of its own, from the default.
 GRID_AXIS = [20, 40, 100, 300, 1000, 3000]
-HOUSE_STATES = {"all on": "", "all off": "all=0", "alarm and desk": "all=0,alarm=1/0.2/0.2,desk=0.5",
-                "half, den open": "all=0.5,door:den=1", "front open": "all=0,door:front=1"}
 FLOOR_SHARE = 0.01  # of the mean light with all sets on, as `dimmer verify` has it
 UPDATE_SHORT_US = 300
 RIVAL, SETTLE_ROUNDS, RIVALS, TURNS = 0.9, 4, 6, 5

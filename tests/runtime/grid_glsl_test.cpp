@@ -117,6 +117,10 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
                 ASSERT_NEAR(results[i].shadowed_lux[c], shadowed_lux[c], model_tolerance) << i;
             }
         }
+        // A slot of no model is black.
+        for (const Result& r : onDevice(device().context(), gpu, ModelSlot{}, queries))
+            for (size_t c = 0; c < 3; ++c) ASSERT_TRUE(r.model_lux[c] == 0 && r.shadowed_lux[c] == 0);
+        EXPECT_EQ(sampler.sample(ModelSlot{}, {5, 2, 6}, {0, 1, 0}), (std::array<float, 3>{}));
     }
 }
 

@@ -242,16 +242,17 @@ struct DimmerModelSlot {
     vec4 grid_from_world[3];   // rows
 };
 
-// What arrives at a place of a model, cd/m2: linear between its probes.
+// What arrives at a place of a model, cd/m2: linear between its probes. Of a slot without probes (no model): nothing.
 DimmerRadiance dimmer_model_radiance(DimmerModelSlot slot, vec3 position, float exposure, uint format) {
     uvec3 counts = slot.first_probe_counts.yzw;
+    DimmerRadiance sum;
+    for (int i = 0; i < 9; ++i) sum.coefficients[i] = vec3(0);
+    if (counts.x == 0u || counts.y == 0u || counts.z == 0u) return sum;
     vec3 at = vec3(dot(slot.grid_from_world[0], vec4(position, 1)), dot(slot.grid_from_world[1], vec4(position, 1)),
                    dot(slot.grid_from_world[2], vec4(position, 1)));
     at = clamp(at, vec3(0), vec3(counts - 1u));
     uvec3 low = min(uvec3(at), max(counts, uvec3(2)) - 2u);
     vec3 share = at - vec3(low);
-    DimmerRadiance sum;
-    for (int i = 0; i < 9; ++i) sum.coefficients[i] = vec3(0);
     for (uint corner = 0u; corner < 8u; ++corner) {
         uvec3 step = uvec3(corner & 1u, corner >> 1 & 1u, corner >> 2);
         vec3 shares = mix(1.0 - share, share, vec3(step));
