@@ -273,6 +273,7 @@ void CookCache::keepSites(const Key& group, std::span<const SiteBlock> blocks,
 
 std::optional<std::vector<glm::vec3>> CookCache::findPlaces(const Key& key) {
     const Entry entry = look(places_kind, key);
+    places_.add(entry.find);
     if (entry.find != Find::Hit) return {};
     format::ByteReader in(entry.bytes);
     auto places = in.getArray<glm::vec3>();
@@ -287,6 +288,7 @@ void CookCache::keepPlaces(const Key& key, std::span<const glm::vec3> places) {
 
 std::optional<SparseLight> CookCache::findRadiance(const Key& key) {
     const Entry entry = look(radiance_kind, key);
+    radiance_.add(entry.find);
     return entry.find == Find::Hit ? radianceFromBytes(entry.bytes) : std::nullopt;
 }
 
@@ -296,12 +298,16 @@ void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {
 
 std::optional<RayEnds> CookCache::findRays(const Key& key, size_t rows, uint32_t receivers, uint32_t paths) {
     RayEnds ends(rows, receivers, paths);
-    std::vector<uint8_t> found(ends.parts());
+    if (ends.parts() == 0) return {};
+    std::vector<Find> found(ends.parts());
     tbb::parallel_for(size_t{0}, ends.parts(), [&](size_t part) {
         const Entry entry = store_.find(rays_kind, partKey(key, part));
-        found[part] = entry.find == Find::Hit && ends.fromBytes(part, entry.bytes);
+        found[part] = entry.find;
+        if (entry.find == Find::Hit && !ends.fromBytes(part, entry.bytes)) found[part] = Find::Damaged;
     });
-    if (std::ranges::count(found, 1) < std::ssize(found) || found.empty()) return {};
+    const Find worst = std::ranges::max(found);
+    rays_.add(worst);
+    if (worst != Find::Hit) return {};
     for (size_t part = 0; part < ends.parts(); ++part)
         used_.push_back(CacheStore::nameOf(rays_kind, partKey(key, part)));
     return ends;
@@ -316,7 +322,27 @@ void CookCache::keepRays(const Key& key, const RayEnds& ends) {
         note(CacheStore::nameOf(rays_kind, partKey(key, part)), kept[part]);
 }
 
+void CookCache::Tally::add(Find find) {
+    ++asked;
+    if (find == Find::Hit) return;
+    ++missing;
+    worst = std::max(worst, find);
+}
+
+void CookCache::tell(const std::string& what, const Tally& tally) {
+    if (tally.asked == 0) return;
+    std::string why;
+    if (tally.missing > 0)
+        why = tally.missing == tally.asked || tally.worst == Find::Damaged
+                  ? whyMissing(tally.worst, {"code", "geometry", "settings of charts", "settings of the bake"})
+                  : fmt::format("{} of {} are new", tally.missing, tally.asked);
+    lines_.push_back({what, tally.missing == 0, why});
+}
+
 void CookCache::finish(uint64_t bytes_max) {
+    tell("where rays end", rays_);
+    tell("places in the open", places_);
+    tell("light that surfaces send on", radiance_);
     // Of what this cook did not ask for, what is known stays.
     auto all = now_;
     all.insert(last_.begin(), last_.end());

@@ -80,6 +80,13 @@ class CookCache {
     void keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes);
     void note(const std::string& name, const Expected<void>& kept);
     std::string whyMissing(Find find, const std::vector<std::string>& parts) const;
+    // Of entries of one kind, which are told of together.
+    struct Tally {
+        size_t asked = 0, missing = 0;
+        Find worst = Find::Missing;
+        void add(Find find);
+    };
+    void tell(const std::string& what, const Tally& tally);
 
     CacheStore store_;
     Key ledger_;
@@ -87,6 +94,7 @@ class CookCache {
     std::vector<std::string> used_;                  // entries found or kept, by name
     std::vector<std::string> kept_;                  // by this cook, likewise
     std::vector<CacheLine> lines_;
+    Tally places_, radiance_, rays_;
     std::vector<std::string> warnings_;
 };
 

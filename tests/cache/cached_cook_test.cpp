@@ -83,7 +83,7 @@ struct CachedCook : testing::Test {
 TEST_F(CachedCook, NothingChangedNothingMade) {
     const LevelFile level = houseOfTwo();
     EXPECT_THAT(made(level), ElementsAre("pack", "charts", "always-on light", "light set 'one'", "light set 'both'",
-                                         "light set 'two'"));
+                                         "light set 'two'", "where rays end"));
     EXPECT_THAT(made(level), IsEmpty());
     const CookResult again = run(level, true);
     EXPECT_EQ(again.stats.rays, 0u);
@@ -139,10 +139,10 @@ TEST_F(CachedCook, GeometryMakesEverything) {
     made(level);
     for (json& node : level.document["nodes"])
         if (node.value("name", "") == "cell2") node["translation"] = {0, 0, 0.1};
-    EXPECT_THAT(made(level), testing::SizeIs(6));
+    EXPECT_THAT(made(level), testing::SizeIs(7));
     EXPECT_THAT(made(level), IsEmpty());
     level.document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = {0.6, 0.7, 0.7, 1};
-    EXPECT_THAT(made(level), testing::SizeIs(6));
+    EXPECT_THAT(made(level), testing::SizeIs(7));
 }
 
 TEST_F(CachedCook, BudgetsAndNamesOfFilesMakeNoLight) {
@@ -263,6 +263,7 @@ TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
     made(level);
     std::vector<std::string> stages = {"pack", "light set 'two'"};
     for (const std::string& stage : gridStages()) stages.push_back(stage);
+    for (const char* stage : {"where rays end", "places in the open"}) stages.push_back(stage);  // around the lamp
     const auto move = [&](double x) {
         for (json& node : level.document["nodes"])
             if (node.value("name", "") == "lamp3") node["translation"][0] = x;
@@ -286,6 +287,7 @@ TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {
     for (const auto& entry : std::filesystem::directory_iterator(folder.path / "cache"))
         if (entry.path().filename().string().starts_with("radiance-")) std::filesystem::remove(entry.path());
     move(8.6);
+    stages.push_back("light that surfaces send on");
     EXPECT_EQ(made(level), stages);
 }
 
@@ -359,10 +361,13 @@ TEST_F(CachedCook, DamagedEntriesAreMadeAgain) {
                 ElementsAre("charts", "grid", "ledger", "light", "pack", "places", "radiance", "rays", "sites"));
     SilentProgress silent;
     const CookResult result = run(level, true);
+    std::set<std::string> told;
     for (const CacheLine& line : result.stats.cache) {
+        told.insert(line.what);
         EXPECT_FALSE(line.reused) << line.what;
         EXPECT_EQ(line.why, "the entry is damaged") << line.what;
     }
+    EXPECT_TRUE(told.contains("where rays end") && told.contains("places in the open"));
     EXPECT_TRUE(bytes("level.dimmer") == bytes("uncached.dimmer"));
     EXPECT_THAT(made(level), IsEmpty());
 }
