@@ -98,7 +98,8 @@ def scatter(figures, cost, label, defaults):
     for f in figures.values():
         lines = [f"{k.split('.')[1]} {v}" for k, v in f["settings"].items()]
         lines += [f"mean {100 * f['mean']:.2f} %, 95th percentile {100 * f['p95']:.1f} %",
-                  f"{f['update_us']:.0f} us ({f['roof']:.2f} of the roof), {f['bytes'] / 1e6:.2f} MB, "
+                  f"{f['update_us']:.0f} us{' (%.2f of the roof)' % f['roof'] if f['roof'] else ''}, "
+                  f"{f['bytes'] / 1e6:.2f} MB, "
                   f"{f['bake_s']:.1f} CPU s"]
         plot.dot(*at(f), DENSITY_COLOURS.get(f["settings"]["lightmaps.texels_per_metre"], "#777"), "\n".join(lines))
     if cost != "bake_s":
