@@ -135,7 +135,7 @@ Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
 Expected<double> CopyRoof::runVariant(size_t variant, CopyTarget target, uint64_t read_bytes, uint64_t written_bytes) {
     const auto units = static_cast<uint32_t>(written_bytes / unit_bytes);
     const uint64_t loads = read_bytes / unit_bytes;
-    if (units == 0 || loads == 0) return 0.0;
+    if (units == 0 || loads == 0 || loads > uint64_t{loads_max} * units) return 0.0;
     // Some units load one more than the others, so that the sum is right.
     const auto fewer = std::clamp(static_cast<uint32_t>(loads / units), 1u, loads_max - 1);
     const auto with_more =

@@ -21,8 +21,9 @@ class CopyRoof {
     // much as one buffer.
     static Expected<CopyRoof> create(const VulkanContext& vulkan, uint64_t read_bytes_max, uint64_t written_bytes_max);
 
-    // Microseconds of one copy; blocking. The kernel is the fastest of several workgroup sizes, of one or four stores
-    // per lane, and of loads from streams apart or from one; found anew for each size of copy and target.
+    // Microseconds of one copy, 0 of one that no kernel is made for (more than 20 times as much read as written);
+    // blocking. The kernel is the fastest of several workgroup sizes, of one or four stores per lane, and of loads from
+    // streams apart or from one; found anew for each size of copy and target.
     Expected<double> run(CopyTarget target, uint64_t read_bytes, uint64_t written_bytes);
 
    private:
