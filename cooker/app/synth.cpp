@@ -7,14 +7,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <map>
 #include <memory>
 
 namespace dimmer::cook {
 namespace {
 
 struct SynthArguments {
-    std::string like, output;
+    std::string like, output, color = "e5b9g9r9";
     SynthOptions options;
 };
 
@@ -27,6 +26,7 @@ std::vector<std::string> levelNames() {
 int run(SynthArguments& a) {
     if (auto ok = checkFiles({}, {{"--output", a.output}}); !ok) return reportError(ok.error());
     a.options.level = *productionLevel(a.like);
+    a.options.color_format = a.color == "e5b9g9r9" ? ColorFormat::E5B9G9R9 : ColorFormat::R11G11B10F;
     auto data = synthesise(a.options);
     if (!data) return reportError(data.error());
     const auto bytes = packBytes(*data);
@@ -56,10 +56,9 @@ void addSynthCommand(CLI::App& app, int& exit_code) {
     c->add_option("--scale", a->options.scale, "times the level's texels")->capture_default_str();
     c->add_option("--clusters", a->options.clusters, "distinct lists of contributions")->capture_default_str();
     c->add_option("--sets", a->options.light_sets, "light sets; 0: as many as the level")->capture_default_str();
-    c->add_option("--color", a->options.color_format, "of the records: e5b9g9r9 or r11g11b10f")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, ColorFormat>{
-            {"e5b9g9r9", ColorFormat::E5B9G9R9}, {"r11g11b10f", ColorFormat::R11G11B10F}}))
-        ->default_str("e5b9g9r9");
+    c->add_option("--color", a->color, "how light is stored")
+        ->check(CLI::IsMember({"e5b9g9r9", "r11g11b10f"}))
+        ->capture_default_str();
     c->add_flag("--probes", a->options.probes, "light probes as well, as many as the level has");
     c->add_option("--seed", a->options.seed, "of the random numbers")->capture_default_str();
     c->footer("Example: dimmer synth --like estate --clusters 1000 -o estate.dimmer");

@@ -23,7 +23,7 @@ class CopyRoof {
 
     // Microseconds of one copy, 0 of one that no kernel is made for (more than 20 times as much read as written);
     // blocking. The kernel is the fastest of several workgroup sizes, of one or four stores per lane, and of loads from
-    // streams apart or from one; found anew for each size of copy and target.
+    // streams apart or from one; found anew for each target and power of two of the bytes that are written.
     Expected<double> run(CopyTarget target, uint64_t read_bytes, uint64_t written_bytes);
 
    private:

@@ -258,6 +258,12 @@ TEST_F(Outputs, NumbersAndNamesThatMeanNothing) {
     expectRefused({"stress", pack(), "--cpu", "--frames", "5", "--minutes", "nan"}, "--minutes");
     expectRefused({"verify", file("level.gltf"), pack(), "--points", "1", "--paths", "2", "--max-error", "nan"},
                   "--max-error");
+    const auto negative = runDimmer({"verify", file("level.gltf"), pack(), "--max-error", "-1"});
+    EXPECT_EQ(negative.exit_code, 2);
+    EXPECT_THAT(negative.err, HasSubstr("--max-error: a share of 0 or more is due, not -1"));
+    const auto color = runDimmer({"synth", "--like", "yard", "--color", "1", "-o", file("synth.dimmer")});
+    EXPECT_EQ(color.exit_code, 2);
+    EXPECT_THAT(color.err, AllOf(HasSubstr("--color"), HasSubstr("r11g11b10f")));
 }
 
 }  // namespace

@@ -69,6 +69,8 @@ TEST_F(ReportTool, WhatIsRefused) {
     write("broken.json", "{");
     refused({"--cook", file("none.json")}, "none.json");
     refused({"--cook", file("broken.json")}, "no JSON");
+    for (const char* figures : {"--cook", "--verify"})
+        refused({figures, std::filesystem::path(file("none.json")).parent_path().string()}, "cannot be opened");
     refused({"--cook", write("list.json", "[1]")}, "not what `dimmer cook --json` writes");
     refused({"--verify", file("broken.json")}, "no JSON");
     for (const char* other : {"[1]", "{}", "null", R"({"state": "", "converged": true, "surface": 1, "sets": []})"})

@@ -3,6 +3,8 @@
 #include <encode/encode.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace dimmer::cook {
 namespace {
 
@@ -88,6 +90,24 @@ TEST(Encode, IrradianceOnTheOwnNormalIsKeptToTheFormatsRounding) {
         }
     }
     EXPECT_EQ(encodeTexel({}, {}).direction, direction_none);
+}
+
+// The largest power of two at which the sum of all at their largest weights takes half of the format's range, 32256;
+// within 2^-40 and 2^40.
+TEST(Encode, ExposureLeavesRoomForTheLargestWeights) {
+    Baked baked;
+    baked.light = Sparse<ReceiverLight>::build(1, [](size_t, size_t, auto emit) {
+        const std::vector<ReceiverLight> row = {{.term = 0, .light = overcast(1)}, {.term = 1, .light = overcast(1)}};
+        emit(std::span<const ReceiverLight>(row));
+    });
+    const auto exposure = [&](float first, float second) {
+        return chooseExposure(baked, std::vector<float>{first, second});
+    };
+    EXPECT_EQ(exposure(1, 2), 0x1p13f);  // 3 lux
+    EXPECT_EQ(exposure(1, 0), 0x1p14f);  // 1 lux: each is stored as it is at weight 1
+    EXPECT_EQ(exposure(1, 1e9f), 0x1p-15f);
+    for (const float absurd : {1e30f, 3e38f, std::numeric_limits<float>::max()})
+        EXPECT_EQ(exposure(absurd, absurd), 0x1p-40f) << absurd;
 }
 
 }  // namespace
