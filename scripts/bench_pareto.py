@@ -262,10 +262,23 @@ def measure_causes(level):
     level.keep("causes", json.loads((level.folder / "causes.json").read_text())["causes"])
 
 
-def measure_level(level, deadline, texels_max):
+def chosen(texts):
+    """--only as {axis: values}."""
+    only = {}
+    for text in texts:
+        axis, _, values = text.partition("=")
+        found = [v for v in AXES.get(axis, []) if str(v) in values.split(",")]
+        if len(found) != len(values.split(",")):
+            sys.exit(f"--only {text}: not AXIS=VALUE,... with an axis and values of "
+                     + "; ".join(f"{a}: {', '.join(map(str, v))}" for a, v in AXES.items()))
+        only[axis] = found
+    return only
+
+
+def measure_level(level, deadline, only):
     truth = level.truth()
     missing = [c for c in configurations()
-               if key_of(c) not in level.results and c["lightmaps.texels_per_metre"] <= texels_max]
+               if key_of(c) not in level.results and all(c[axis] in values for axis, values in only.items())]
     begin = time.monotonic()
     for done, configuration in enumerate(missing):
         if time.monotonic() > deadline:
@@ -326,10 +339,12 @@ def main():
     parser.add_argument("--levels", nargs="*", default=["two_rooms", "house", "lq_old_start", "lq_e2m2", "lq_e2m3"])
     parser.add_argument("--quality", default="draft", choices=["draft", "preview", "final"])
     parser.add_argument("--minutes", type=float, default=60, help="end after so long; the next run goes on from there")
-    parser.add_argument("--texels-max", type=float, default=max(AXES["lightmaps.texels_per_metre"]),
-                        help="leave out more texels per metre: a large level's bake takes a quarter of an hour at 8")
+    parser.add_argument("--only", nargs="*", default=[], metavar="AXIS=VALUE,...",
+                        help="configurations with these values, as in lightmaps.texels_per_metre=1,2,4: a large level's "
+                             "bake takes a quarter of an hour at 8")
     parser.add_argument("--report-only", action="store_true", help="from what was measured before")
     options = parser.parse_args()
+    only = chosen(options.only)
     names = [n for n in options.levels if n == "house" or ((LEVELS / f"{n}.glb").exists() and TRUTH.exists())]
     for name in sorted(set(options.levels) - set(names)):
         print(f"{name}: not measured: it is expected in {LEVELS}", file=sys.stderr)
@@ -338,7 +353,7 @@ def main():
         begin = time.monotonic()
         for number, level in enumerate(levels):
             share = (number + 1) / len(levels)
-            measure_level(level, begin + 60 * options.minutes * share, options.texels_max)
+            measure_level(level, begin + 60 * options.minutes * share, only)
             measure_causes(level)
             measure_grids(level)
             for configuration in profiles().values():

@@ -58,9 +58,14 @@ class Writer {
         std::span<const std::byte> bytes;
     };
 
+    // Neighbours in these are alike, byte by byte; of all others zstd makes less of the differences.
+    static bool storesDifferences(ChunkType type) {
+        return type == ChunkType::BasePages || type == ChunkType::Payload || type == ChunkType::Addresses;
+    }
+
     void add(ChunkType type, uint32_t subject, Content content, uint32_t record_bytes) {
         chunks_.push_back({.type = static_cast<uint32_t>(type),
-                           .flags = 0,
+                           .flags = storesDifferences(type) ? format::chunk_delta : 0u,
                            .subject = subject,
                            .shuffle = record_bytes,
                            .offset = 0,
@@ -73,17 +78,21 @@ class Writer {
     void compressAll() {
         bodies_.resize(chunks_.size());
         tbb::parallel_for(size_t{0}, chunks_.size(), [&](size_t i) {
-            bodies_[i] = compressed(contents_[i].bytes, chunks_[i].shuffle);
+            bodies_[i] = compressed(contents_[i].bytes, chunks_[i].shuffle, chunks_[i].flags & format::chunk_delta);
             chunks_[i].stored_bytes = bodies_[i].size();
             chunks_[i].xxh64 = format::chunkHash(bodies_[i]);
         });
     }
 
-    std::vector<std::byte> compressed(std::span<const std::byte> bytes, uint32_t record_bytes) const {
+    std::vector<std::byte> compressed(std::span<const std::byte> bytes, uint32_t record_bytes, bool differences) const {
         std::vector<std::byte> shuffled(bytes.size());
         const size_t count = bytes.size() / record_bytes;
-        for (size_t b = 0; b < record_bytes; ++b)
-            for (size_t i = 0; i < count; ++i) shuffled[b * count + i] = bytes[i * record_bytes + b];
+        for (size_t b = 0; b < record_bytes; ++b) {
+            const std::span plane = std::span(shuffled).subspan(b * count, count);
+            for (size_t i = 0; i < count; ++i) plane[i] = bytes[i * record_bytes + b];
+            for (size_t i = count; differences && i-- > 1;)
+                plane[i] = std::byte(std::to_integer<uint8_t>(plane[i]) - std::to_integer<uint8_t>(plane[i - 1]));
+        }
         std::vector<std::byte> stored(ZSTD_compressBound(shuffled.size()));
         const size_t size = ZSTD_compress(stored.data(), stored.size(), shuffled.data(), shuffled.size(), zstd_level_);
         if (ZSTD_isError(size)) throw std::bad_alloc();  // with room for the result, memory is all that it can lack

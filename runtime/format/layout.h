@@ -8,7 +8,7 @@
 namespace dimmer::format {
 
 inline constexpr std::array<char, 8> magic = {'D', 'I', 'M', 'M', 'E', 'R', '\r', '\n'};
-inline constexpr uint32_t version = 6;
+inline constexpr uint32_t version = 7;
 inline constexpr uint32_t endian_tag = 0x01020304;
 inline constexpr uint64_t chunk_alignment_bytes = 64;
 
@@ -50,6 +50,7 @@ enum class ChunkType : uint32_t {
 
 enum ChunkFlags : uint32_t {
     chunk_optional = 1,  // a reader that does not know the type skips it
+    chunk_delta = 2,     // after the shuffle, what is stored of each byte is its difference from the one before it
 };
 
 struct Header {

@@ -116,6 +116,8 @@ class Reader {
                 return bad("chunk {} reaches past the end of the file", name(c));
             if (c.real_bytes / expansion_max > c.stored_bytes || c.shuffle == 0)
                 return bad("chunk {} has an impossible size", name(c));
+            if (known(c.type) && (c.flags & ~(format::chunk_optional | format::chunk_delta)) != 0)
+                return bad("chunk {} is stored in a way that this build does not know", name(c));
             if (!known(c.type) && !(c.flags & format::chunk_optional))
                 return bad("chunk {} is of a type that this build does not know", name(c));
             if (known(c.type) && !by_name_.emplace(std::pair(c.type, c.subject), &c).second)
@@ -186,7 +188,7 @@ class Reader {
         if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
         auto shuffled = decompressor_.run(stored, c.real_bytes);
         if (!shuffled) return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
-        return unshuffle(std::move(*shuffled), c.shuffle);
+        return unshuffle(std::move(*shuffled), c.shuffle, c.flags & format::chunk_delta);
     }
 
     Expected<void> checkNothingLeft() const {
@@ -195,9 +197,18 @@ class Reader {
         return bad("chunk {} belongs to nothing", name(c));
     }
 
-    static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record) {
-        if (record <= 1 || bytes.empty() || bytes.size() % record != 0) return bytes;
+    static void addUp(std::span<std::byte> differences) {
+        uint8_t sum = 0;
+        for (std::byte& b : differences) b = std::byte(sum += std::to_integer<uint8_t>(b));
+    }
+
+    // A chunk that ends within a record comes back as it is, for array() to refuse.
+    static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record, bool differences) {
+        if (bytes.empty() || bytes.size() % record != 0) return bytes;
         const size_t count = bytes.size() / record;
+        if (differences)
+            for (size_t b = 0; b < record; ++b) addUp(std::span(bytes).subspan(b * count, count));
+        if (record == 1) return bytes;
         std::vector<std::byte> out(bytes.size());
         // Some kilobytes at a time, so that each is written to memory once.
         constexpr size_t block = 512;

@@ -111,6 +111,12 @@ TEST(PackDamage, AnEmptyChunkOfHugeRecordsIsReadAtOnce) {
     EXPECT_TRUE(pack.has_value()) << pack.error().message;  // 800 billion steps would be minutes
 }
 
+TEST(PackDamage, FlagsOfTheFuture) {
+    PackFile file(packBytes(samplePack()));
+    file.chunk("MESH").flags = 4;
+    expectRefused(file.bytes(), "chunk MESH is stored in a way that this build does not know");
+}
+
 TEST(PackDamage, ForeignFiles) {
     const Bytes whole = packBytes(samplePack());
     Bytes other = whole;

@@ -22,6 +22,26 @@ std::vector<std::byte> shuffle(const std::vector<std::byte>& bytes, size_t recor
     return out;
 }
 
+// Differences of neighbours within each of the shuffle's groups, or back.
+std::vector<std::byte> differences(std::vector<std::byte> bytes, size_t record, bool undo) {
+    if (bytes.size() % record != 0) return bytes;
+    const size_t count = bytes.size() / record;
+    uint8_t before = 0;
+    for (size_t i = 0; i < bytes.size(); ++i) {
+        if (i % count == 0) before = 0;
+        const auto byte = std::to_integer<uint8_t>(bytes[i]);
+        const auto other = static_cast<uint8_t>(undo ? byte + before : byte - before);
+        bytes[i] = std::byte(other);
+        before = undo ? other : byte;
+    }
+    return bytes;
+}
+
+std::vector<std::byte> inFile(const ChunkContent& c) {
+    auto bytes = shuffle(c.bytes, c.shuffle, false);
+    return c.flags & format::chunk_delta ? differences(std::move(bytes), c.shuffle, false) : bytes;
+}
+
 std::vector<std::byte> compress(const std::vector<std::byte>& bytes) {
     std::vector<std::byte> out(ZSTD_compressBound(bytes.size()));
     out.resize(ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 1));
@@ -43,6 +63,7 @@ PackFile::PackFile(std::span<const std::byte> file) {
         std::memcpy(&c, file.data() + sizeof(header) + i * sizeof(c), sizeof(c));
         std::vector<std::byte> raw(c.real_bytes);
         EXPECT_EQ(ZSTD_decompress(raw.data(), raw.size(), file.data() + c.offset, c.stored_bytes), c.real_bytes);
+        if (c.flags & format::chunk_delta) raw = differences(std::move(raw), c.shuffle, true);
         chunks.push_back({c.type, c.flags, c.subject, c.shuffle, shuffle(raw, c.shuffle, true), UINT64_MAX, {}});
     }
 }
@@ -52,7 +73,7 @@ std::vector<std::byte> PackFile::bytes() const {
     std::vector<std::byte> body;
     const size_t body_start = (sizeof(header) + chunks.size() * sizeof(format::Chunk) + 63) / 64 * 64;
     for (const ChunkContent& c : chunks) {
-        const auto stored = c.stored.empty() ? compress(shuffle(c.bytes, c.shuffle, false)) : c.stored;
+        const auto stored = c.stored.empty() ? compress(inFile(c)) : c.stored;
         table.push_back({c.type, c.flags, c.subject, c.shuffle, body_start + body.size(), stored.size(),
                          c.claimed_bytes == UINT64_MAX ? c.bytes.size() : c.claimed_bytes,
                          XXH64(stored.data(), stored.size(), 0)});

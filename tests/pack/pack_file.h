@@ -15,7 +15,7 @@ namespace dimmer::test {
 
 struct ChunkContent {
     uint32_t type = 0, flags = 0, subject = 0, shuffle = 1;
-    std::vector<std::byte> bytes;  // decompressed and unshuffled
+    std::vector<std::byte> bytes;  // decompressed, added up and unshuffled
     // What the table says of the size; empty: the truth.
     uint64_t claimed_bytes = UINT64_MAX;
     // Used in place of the compressed bytes when not empty.

@@ -252,6 +252,18 @@ TEST(PackLayout, AnotherWriterOfTheSameFormatIsUnderstood) {
     expectEqual(data, pack->data());
 }
 
+// A writer may choose differences for any chunk, and for none.
+TEST(PackLayout, DifferencesAreForTheWriterToChoose) {
+    const PackData data = samplePack();
+    PackFile file(packBytes(data));
+    EXPECT_EQ(file.chunk("PAYL").flags, format::chunk_delta);
+    EXPECT_EQ(file.chunk("MESH").flags, 0u);
+    for (ChunkContent& c : file.chunks) c.flags ^= format::chunk_delta;
+    const auto pack = Pack::fromBytes(file.bytes(), "test");
+    ASSERT_TRUE(pack.has_value()) << pack.error().message;
+    expectEqual(data, pack->data());
+}
+
 TEST(PackLayout, UnknownChunksAreSkippedOnlyWhenOptional) {
     const PackData data = samplePack();
     PackFile file(packBytes(data));
