@@ -10,6 +10,7 @@
 #include <pipeline/cook_settings.h>
 #include <pipeline/cook_warnings.h>
 #include <pipeline/encode_pack.h>
+#include <pipeline/lamps_apart.h>
 
 #include <fmt/format.h>
 
@@ -89,6 +90,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     if (!quality)
         return fail(ErrorCode::InvalidArgument,
                     fmt::format("there is no quality '{}'; take draft, preview or final", quality_name));
+    const BakeSettings settings = bakeSettings(profile, *quality, scene);
+    const LampGroups lamps = takeLampsApart(scene, quality->lamps_apart);
     Receivers at(std::move(scene), profile);
     ChartedLevel& level = at.level;
     {
@@ -107,10 +110,12 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     Baked baked;
     {
         const Stopwatch watch(stats.seconds["bake"]);
-        const BakeSettings settings = bakeSettings(profile, *quality, level.scene);
+        BakeSettings of_parts = settings;
+        of_parts.group_thresholds = lamps.ofParts(settings.group_thresholds);
         StageTimer timer(progress, stats.bake_seconds);
-        baked = bakeWithCache(at, settings, timer, cache);
+        baked = bakeWithCache(at, of_parts, timer, cache);
         multiplyByScales(level.scales, baked);
+        putTogether(lamps, level.scales, level.scene, baked);
         // Before the limit: what it drops comes back where higher thresholds make room.
         if (losses)
             *losses = LossTable(baked, at.texels, settings.group_thresholds, profile.overlap_max,

@@ -37,59 +37,82 @@ std::vector<std::vector<ProbeTermLight>> tracedAtProbes(const Placement& placed,
     return rows;
 }
 
-// The light of one term at one site.
-struct SiteTerm {
-    uint32_t site;
-    const ProbeLight* light;
+// The light of one term at one place: a site or a probe.
+template <class Light>
+struct PlaceTerm {
+    uint32_t place;
+    Light* light;
 };
+using SiteTerm = PlaceTerm<const ProbeLight>;
+using ProbeTerm = PlaceTerm<ProbeLight>;
 
-// Per term, ascending sites. Points into `light`.
-std::vector<std::vector<SiteTerm>> byTerm(const Sparse<ProbeTermLight>& light, size_t terms) {
-    std::vector<std::vector<SiteTerm>> sites(terms);
-    for (uint32_t s = 0; s < light.rows(); ++s)
-        for (const ProbeTermLight& l : light.row(s)) sites[l.term].push_back({s, &l.light});
+// Per term, ascending places. Points into the rows.
+template <class Light>
+std::vector<std::vector<PlaceTerm<Light>>> byTerm(size_t rows, size_t terms, auto&& rowOf) {
+    std::vector<std::vector<PlaceTerm<Light>>> places(terms);
+    for (uint32_t i = 0; i < rows; ++i)
+        for (auto& l : rowOf(i)) places[l.term].push_back({i, &l.light});
+    return places;
+}
+
+// Per probe, ascending: the sites that it counts at.
+std::vector<std::vector<uint32_t>> sitesOfProbes(const Placement& placed) {
+    std::vector<std::vector<uint32_t>> sites(placed.place_of.size());
+    for (uint32_t s = 0; s < placed.sites.size(); ++s)
+        for (const uint32_t probe : placed.sites[s].probes)
+            if (sites[probe].empty() || sites[probe].back() != s) sites[probe].push_back(s);
     return sites;
 }
 
 // One term over the probes that have it and the sites where they count.
 class TermFit {
    public:
-    TermFit(const Placement& placed, std::span<const SiteTerm> light)
-        : placed_(placed), light_(light), number_(placed.place_of.size(), not_a_member) {}
+    TermFit(const Placement& placed, const std::vector<std::vector<uint32_t>>& sites_of_probes,
+            std::span<const SiteTerm> light)
+        : placed_(placed),
+          sites_of_probes_(sites_of_probes),
+          light_(light),
+          number_(placed.place_of.size(), not_a_member) {}
 
-    void fit(uint32_t term, std::vector<std::vector<ProbeTermLight>>& rows) {
-        std::vector<ProbeTermLight*> members;
-        for (uint32_t i = 0; i < rows.size(); ++i) {
-            const auto found = std::ranges::find(rows[i], term, &ProbeTermLight::term);
-            number_[i] = found == rows[i].end() ? not_a_member : static_cast<uint32_t>(members.size());
-            if (found != rows[i].end()) members.push_back(&*found);
-        }
+    void fit(std::span<const ProbeTerm> members) {
         if (members.empty()) return;
         std::vector<FitValue> probes;
-        for (const ProbeTermLight* l : members) probes.push_back(valueOf(l->light));
-        chooseSites();
+        for (const ProbeTerm& member : members) {
+            number_[member.place] = static_cast<uint32_t>(probes.size());
+            probes.push_back(valueOf(*member.light));
+        }
+        chooseSites(members);
         const float floor = floorOfLight();
         for (size_t s = 0; s < sites_.size(); ++s) sites_[s].importance = importanceOf(targets_[s], floor);
         std::vector<float> own;
-        for (size_t i = 0; i < number_.size(); ++i)
-            if (number_[i] != not_a_member)
-                own.push_back(placed_.guessed[i] ? 0 : importanceOf(probes[number_[i]], floor));
+        for (size_t i = 0; i < members.size(); ++i)
+            own.push_back(placed_.guessed[members[i].place] ? 0 : importanceOf(probes[i], floor));
         fitProbes(sites_, targets_, probes, fit_tolerance, own);
         for (size_t i = 0; i < members.size(); ++i)
-            members[i]->light.radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
+            members[i].light->radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
     }
 
    private:
     static FitValue valueOf(const ProbeLight& light) { return std::bit_cast<FitValue>(light.radiance); }
 
-    // Those with a probe of the term; where it is not active it is as good as dark.
-    void chooseSites() {
+    // Ascending. Most terms are of few probes, and most sites none of theirs.
+    std::vector<uint32_t> sitesOf(std::span<const ProbeTerm> members) const {
+        constexpr uint32_t bits = 64;
+        std::vector<uint64_t> marks(placed_.sites.size() / bits + 1);
+        for (const ProbeTerm& member : members)
+            for (const uint32_t s : sites_of_probes_[member.place]) marks[s / bits] |= uint64_t{1} << s % bits;
+        std::vector<uint32_t> sites;
+        for (uint32_t w = 0; w < marks.size(); ++w)
+            for (uint64_t left = marks[w]; left != 0; left &= left - 1)
+                sites.push_back(w * bits + static_cast<uint32_t>(std::countr_zero(left)));
+        return sites;
+    }
+
+    // Where the term is not active it is as good as dark.
+    void chooseSites(std::span<const ProbeTerm> members) {
         auto lit = light_.begin();
-        for (uint32_t s = 0; s < placed_.sites.size(); ++s) {
-            while (lit != light_.end() && lit->site < s) ++lit;
-            // Most terms are of few probes, and most sites none of theirs.
-            const auto& around = placed_.sites[s].probes;
-            if (std::ranges::none_of(around, [&](uint32_t p) { return number_[p] != not_a_member; })) continue;
+        for (const uint32_t s : sitesOf(members)) {
+            while (lit != light_.end() && lit->place < s) ++lit;
             FitSite site = placed_.sites[s];
             float known = 0;
             for (size_t k = 0; k < 4; ++k) {
@@ -99,7 +122,7 @@ class TermFit {
                 known += site.shares[k];
             }
             if (!(known > 0)) continue;
-            targets_.push_back(lit != light_.end() && lit->site == s ? valueOf(*lit->light) : FitValue{});
+            targets_.push_back(lit != light_.end() && lit->place == s ? valueOf(*lit->light) : FitValue{});
             sites_.push_back(site);
         }
     }
@@ -123,6 +146,7 @@ class TermFit {
     }
 
     const Placement& placed_;
+    const std::vector<std::vector<uint32_t>>& sites_of_probes_;
     std::span<const SiteTerm> light_;
     std::vector<uint32_t> number_;  // per position, among the probes of the term
     std::vector<FitSite> sites_;
@@ -142,12 +166,17 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
     progress.stage("probes", terms.size());
     // Blocks of rows are large for so few receivers, so each row is made on its own.
     auto rows = tracedAtProbes(*placed, light);
-    const auto sites = byTerm(light, terms.size());
-    if (settings.fit)
+    if (settings.fit) {
+        const auto sites =
+            byTerm<const ProbeLight>(light.rows(), terms.size(), [&](uint32_t s) { return light.row(s); });
+        const auto members =
+            byTerm<ProbeLight>(rows.size(), terms.size(), [&](uint32_t i) { return std::span(rows[i]); });
+        const auto sites_of_probes = sitesOfProbes(*placed);
         tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) {
-            TermFit(*placed, sites[t]).fit(static_cast<uint32_t>(t), rows);
+            TermFit(*placed, sites_of_probes, sites[t]).fit(members[t]);
             progress.advance(1);
         });
+    }
     out.light = Sparse<ProbeTermLight>::build(placed->place_of.size(), [&](size_t begin, size_t end, auto emit) {
         for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[i]));
     });

@@ -119,6 +119,30 @@ TEST_F(CachedCook, AnyOtherEditOfASetMakesThatSet) {
     EXPECT_THAT(why(level, "pack"), IsEmpty());
 }
 
+// Lamp by lamp: brightness of one is a multiplication, and what moves is baked alone.
+TEST_F(CachedCook, OfLampsTakenApartTheEditedOneIsMade) {
+    profile =
+        writeText(
+            folder, "apart.json",
+            std::string(quick_profile).insert(std::string(quick_profile).find("\"bounces"), "\"lamps_apart\": 4, "))
+            .string();
+    LevelFile level = houseOfTwo();
+    level.addNode({{"name", "ball"}, {"translation", {1, 1, 1}}, {"extras", {{"dimmer_dynamic", true}}}});
+    EXPECT_THAT(made(level), testing::IsSupersetOf({"light set 'one, surfaces'", "light set 'one, lamp lamp1'",
+                                                    "light set 'both, lamp lamp2'", "light set 'both, lamp lamp4'",
+                                                    "light set 'two'"}));
+    lamp(level, 1)["intensity"] = 50;  // one of two lamps
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    lamp(level, 0)["color"] = {0.3, 0.2, 0.9};  // not the panel
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "lamp4") node["translation"][0] = 9.2;
+    std::vector<std::string> light;
+    for (const std::string& stage : made(level))
+        if (stage.starts_with("light set") || stage.starts_with("always")) light.push_back(stage);
+    EXPECT_THAT(light, ElementsAre("light set 'both, lamp lamp4'"));
+}
+
 TEST_F(CachedCook, ASetMoreOrLessLeavesTheOthers) {
     LevelFile level = houseOfTwo();
     made(level);
