@@ -4,6 +4,7 @@
 #include <dimmer/light_state.h>
 #include <pack/pack_data.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
@@ -33,6 +34,28 @@ inline double quantum(double value, int mantissa_bits) {
     return std::ldexp(1.0, std::ilogb(value) - mantissa_bits);
 }
 
+// From the definition of VK_FORMAT_E5B9G9R9_UFLOAT_PACK32: 9 bits a channel, times 2^(exponent - 15 - 9).
+inline std::array<double, 3> sharedExponentDecoded(uint32_t irradiance) {
+    const int exponent = static_cast<int>(irradiance >> 27) - 24;
+    return {std::ldexp(irradiance & 0x1ff, exponent), std::ldexp(irradiance >> 9 & 0x1ff, exponent),
+            std::ldexp(irradiance >> 18 & 0x1ff, exponent)};
+}
+
+inline std::array<double, 3> decoded(uint32_t irradiance, ColorFormat format) {
+    return format == ColorFormat::E5B9G9R9 ? sharedExponentDecoded(irradiance) : decoded(irradiance);
+}
+
+// One step of each channel where the light is `exact`; the brightest channel decides for all where they share an
+// exponent.
+inline std::array<double, 3> quanta(const std::array<double, 3>& exact, ColorFormat format) {
+    std::array<double, 3> steps{};
+    const double largest = std::max({exact[0], exact[1], exact[2]});
+    for (size_t c = 0; c < 3; ++c)
+        steps[c] = format == ColorFormat::E5B9G9R9 ? std::max(quantum(largest, 8), 0x1p-24)
+                                                   : quantum(exact[c], channel_mantissa_bits[c]);
+    return steps;
+}
+
 inline size_t texelOf(const PackData& data, uint32_t receiver) {
     const uint32_t address = data.addresses[receiver];
     return (size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address)) * data.page_width +
@@ -42,7 +65,7 @@ inline size_t texelOf(const PackData& data, uint32_t receiver) {
 // Stored irradiance per texel of the pages.
 inline std::vector<std::array<double, 3>> exactPages(const PackData& data, const LightState& state) {
     std::vector<std::array<double, 3>> pages;
-    for (const TexelRecord& record : data.base_pages) pages.push_back(decoded(record.irradiance));
+    for (const TexelRecord& record : data.base_pages) pages.push_back(decoded(record.irradiance, data.color_format));
     for (const Cluster& cluster : data.clusters)
         for (uint32_t t = cluster.first_term; t < cluster.first_term + cluster.term_count; ++t) {
             const Contribution& contribution = data.contributions[data.terms[t].contribution];
@@ -54,7 +77,7 @@ inline std::vector<std::array<double, 3>> exactPages(const PackData& data, const
                                                   doors * static_cast<double>(dim.g),
                                                   doors * static_cast<double>(dim.b)};
             for (uint32_t i = 0; i < cluster.receiver_count; ++i) {
-                const auto record = decoded(data.payload[data.terms[t].first_record + i].irradiance);
+                const auto record = decoded(data.payload[data.terms[t].first_record + i].irradiance, data.color_format);
                 auto& sum = pages[texelOf(data, cluster.first_receiver + i)];
                 for (size_t c = 0; c < 3; ++c) sum[c] += weight[c] * record[c];
             }

@@ -19,22 +19,25 @@ using GpuStability = test::GpuTest;
 TEST_F(GpuStability, RandomTogglesEndInTheStateOfAFreshRuntime) {
     const char* asked = std::getenv("DIMMER_TOGGLES");
     const auto toggles = asked ? static_cast<uint32_t>(std::atol(asked)) : 3000u;
-    const Pack pack = packOf(test::randomPack(41, {.sets = 24, .doors = 4, .clusters = 60, .page_side = 80}));
-    Runtime runtime = runtimeOf(pack, {.timestamps = false});
-    test::Random random(41);
-    test::toggleAtRandom(runtime, random, toggles, [&] { ASSERT_TRUE(runtime.submit()); });
-    Runtime fresh = runtimeOf(pack);
-    test::copyState(runtime, fresh);
-    ASSERT_TRUE(fresh.submit());
-    CpuRuntime cpu(pack);
-    test::copyState(runtime, cpu);
-    cpu.update();
-    const auto a = runtime.readPages(), b = fresh.readPages();
-    ASSERT_TRUE(a && b);
-    EXPECT_EQ(a->irradiance, b->irradiance);
-    EXPECT_EQ(a->direction, b->direction);
-    EXPECT_TRUE(std::ranges::equal(a->irradiance, cpu.irradiancePages()));
-    EXPECT_TRUE(std::ranges::equal(a->direction, cpu.directionPages()));
+    for (const ColorFormat format : {ColorFormat::R11G11B10F, ColorFormat::E5B9G9R9}) {
+        const Pack pack = packOf(
+            test::randomPack(41, {.sets = 24, .doors = 4, .clusters = 60, .page_side = 80, .color_format = format}));
+        Runtime runtime = runtimeOf(pack, {.timestamps = false});
+        test::Random random(41);
+        test::toggleAtRandom(runtime, random, toggles, [&] { ASSERT_TRUE(runtime.submit()); });
+        Runtime fresh = runtimeOf(pack);
+        test::copyState(runtime, fresh);
+        ASSERT_TRUE(fresh.submit());
+        CpuRuntime cpu(pack);
+        test::copyState(runtime, cpu);
+        cpu.update();
+        const auto a = runtime.readPages(), b = fresh.readPages();
+        ASSERT_TRUE(a && b);
+        EXPECT_EQ(a->irradiance, b->irradiance);
+        EXPECT_EQ(a->direction, b->direction);
+        EXPECT_TRUE(std::ranges::equal(a->irradiance, cpu.irradiancePages()));
+        EXPECT_TRUE(std::ranges::equal(a->direction, cpu.directionPages()));
+    }
 }
 
 TEST_F(GpuStability, DeviceMemoryIsTheSumThatInspectStates) {
