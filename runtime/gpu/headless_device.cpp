@@ -19,6 +19,7 @@ struct MessageLog {
 namespace {
 
 constexpr const char* validation_layer = "VK_LAYER_KHRONOS_validation";
+constexpr const char* driver_on_cpu = "On Debian the package mesa-vulkan-drivers brings one that runs on the CPU.";
 
 VKAPI_ATTR VkBool32 VKAPI_CALL onMessage(VkDebugUtilsMessageSeverityFlagBitsEXT, VkDebugUtilsMessageTypeFlagsEXT,
                                          const VkDebugUtilsMessengerCallbackDataEXT* data, void* user) {
@@ -154,7 +155,10 @@ Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
         info.ppEnabledExtensionNames = extensions;
     }
     const auto vkCreateInstance = loaderFunction<PFN_vkCreateInstance>(VK_NULL_HANDLE, "vkCreateInstance");
-    DIMMER_VK(vkCreateInstance, &info, nullptr, &vulkan.instance);
+    const VkResult created = vkCreateInstance(&info, nullptr, &vulkan.instance);
+    if (created == VK_ERROR_INCOMPATIBLE_DRIVER)
+        return fail(ErrorCode::Unsupported, fmt::format("No Vulkan driver was found. {}", driver_on_cpu));
+    if (created < 0) return vulkanError(created, "vkCreateInstance");
     auto loaded = VulkanFunctions::load(nullptr, vulkan.instance);
     if (!loaded) return std::unexpected(std::move(loaded.error()));
     functions = std::move(*loaded);
@@ -195,9 +199,8 @@ Expected<void> HeadlessDevice::Impl::choosePhysicalDevice(bool graphics) {
     }
     if (!vulkan.physical_device)
         return fail(ErrorCode::Unsupported,
-                    fmt::format("No Vulkan 1.2 device with a queue for {} was found among {}. On Debian the package "
-                                "mesa-vulkan-drivers brings one that runs on the CPU.",
-                                graphics ? "drawing and compute" : "compute", count));
+                    fmt::format("No Vulkan 1.2 device with a queue for {} was found among {}. {}",
+                                graphics ? "drawing and compute" : "compute", count, driver_on_cpu));
     return {};
 }
 

@@ -215,6 +215,17 @@ TEST_F(Commands, BenchJson) {
     EXPECT_EQ(j["cases"][0]["batches"], 0);
 }
 
+// The loader is there, and no driver that it could load.
+TEST_F(Commands, WithoutADriverBenchNamesOne) {
+    const auto result = runProcess("/usr/bin/env", {"VK_DRIVER_FILES=/no/driver", "VK_ICD_FILENAMES=/no/driver",
+                                                    DIMMER_TOOL, "bench", pack(), "--frames", "1"});
+    EXPECT_EQ(result.exit_code, 1);
+    EXPECT_THAT(result.err, HasSubstr("No Vulkan driver was found. On Debian the package mesa-vulkan-drivers"));
+    const auto cpu = runProcess("/usr/bin/env", {"VK_DRIVER_FILES=/no/driver", "VK_ICD_FILENAMES=/no/driver",
+                                                 DIMMER_TOOL, "bench", pack(), "--frames", "1", "--mode", "cpu"});
+    EXPECT_EQ(cpu.exit_code, 0) << cpu.err;
+}
+
 TEST_F(Commands, OutputThatCannotBeWrittenIsNoSuccess) {
     // A shell, to give the tool a full disk as stdout.
     const auto result =
