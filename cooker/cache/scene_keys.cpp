@@ -86,6 +86,25 @@ void addSky(KeyBuilder& key, const Scene& scene) {
     if (scene.sky_image) addImage(key, *scene.sky_image);
 }
 
+// As the level has them, whatever the lamps are that a set is taken apart into: paths are the same.
+void addCombinations(KeyBuilder& key, const Scene& scene) {
+    std::vector<std::vector<std::pair<bool, std::string>>> named;
+    for (const auto& combination : scene.combinations) {
+        std::vector<std::pair<bool, std::string>> names;
+        for (const ElementRef& e : combination) {
+            const std::string& own = e.is_door ? scene.doors[e.index].name : scene.light_sets[e.index].name;
+            const bool is_part = !e.is_door && !scene.light_sets[e.index].part_of.empty();
+            names.emplace_back(e.is_door, is_part ? scene.light_sets[e.index].part_of : own);
+        }
+        if (named.empty() || named.back() != names) named.push_back(std::move(names));
+    }
+    key.add(uint64_t{named.size()});
+    for (const auto& names : named) {
+        key.add(uint64_t{names.size()});
+        for (const auto& [is_door, name] : names) key.add(uint32_t{is_door}).add(name);
+    }
+}
+
 void addPlayAreas(KeyBuilder& key, const Scene& scene) {
     key.add(uint64_t{scene.play_areas.size()});
     for (const PlayArea& area : scene.play_areas)
@@ -109,14 +128,7 @@ Key geometryKey(const Scene& scene) {
         for (int axis = 0; axis < 3; ++axis) key.add(model.probes[axis]);
     key.add(uint64_t{scene.doors.size()});
     for (const SceneDoor& door : scene.doors) key.add(door.name).add(uint32_t{door.pose});
-    key.add(uint64_t{scene.combinations.size()});
-    for (const auto& combination : scene.combinations) {
-        key.add(uint64_t{combination.size()});
-        for (const ElementRef& e : combination) {
-            key.add(uint32_t{e.is_door});
-            key.add(e.is_door ? scene.doors[e.index].name : scene.light_sets[e.index].name);
-        }
-    }
+    addCombinations(key, scene);
     return key.finish();
 }
 

@@ -341,7 +341,15 @@ void measureStorage(Storage& s, TermAccumulator<Falloff>& sum, std::span<const g
 
 Expected<void> checkRebake(const Scene& scene, const Pack& pack) {
     const auto charted = chartAgain(scene, pack.data());
-    return charted ? Expected<void>() : std::unexpected(charted.error());
+    if (!charted) return std::unexpected(charted.error());
+    const auto settings = readSettings(pack.data().settings_json);
+    if (!settings) return std::unexpected(settings.error());
+    if (settings->profile.quality(settings->quality)->lamps_apart == 0) return {};
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: causes are told of sets that were baked whole, and the pack's were baked lamp by lamp; "
+                    "cook it with --set bake.{}.lamps_apart=0.",
+                    scene.file, settings->quality));
 }
 
 Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::span<const VerifyPoint> points,

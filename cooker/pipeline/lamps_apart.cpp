@@ -38,7 +38,10 @@ std::vector<SetParts> partsOfSets(const Scene& scene) {
 // No set's own name has a comma.
 class PartNames {
    public:
-    std::string of(const std::string& set, const std::string& part) {
+    // `part`: a node may have any name.
+    std::string of(const std::string& set, std::string part) {
+        std::ranges::replace_if(
+            part, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
         std::string name = fmt::format("{}, {}", set, part);
         for (int n = 2; !used_.insert(name).second; ++n) name = fmt::format("{}, {} ({})", set, part, n);
         return name;
@@ -131,7 +134,7 @@ LampGroups takeLampsApart(Scene& scene, uint32_t lamps_max) {
         const auto add = [&](std::string name) {
             parts_of[s].push_back(static_cast<uint32_t>(sets.size()));
             out.whole.push_back(groupOf(s));
-            sets.push_back({std::move(name), whole.max_weight});
+            sets.push_back({std::move(name), whole.max_weight, isApart(parts[s]) ? whole.name : ""});
         };
         if (!isApart(parts[s])) {
             add(whole.name);

@@ -138,6 +138,8 @@ struct PunctualLight {
 struct SceneLightSet {
     std::string name;
     float max_weight = 1;
+    // The level's set that this is a lamp of (pipeline/lamps_apart.h); empty: it is the level's own.
+    std::string part_of = {};
 };
 
 struct SceneDoor {

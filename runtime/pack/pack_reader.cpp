@@ -116,6 +116,7 @@ class Reader {
                 return bad("chunk {} reaches past the end of the file", name(c));
             if (c.real_bytes / expansion_max > c.stored_bytes || c.shuffle == 0)
                 return bad("chunk {} has an impossible size", name(c));
+            if (known(c.type) && c.real_bytes % c.shuffle != 0) return bad("chunk {} ends within a record", name(c));
             if (known(c.type) && (c.flags & ~(format::chunk_optional | format::chunk_delta)) != 0)
                 return bad("chunk {} is stored in a way that this build does not know", name(c));
             if (!known(c.type) && !(c.flags & format::chunk_optional))
@@ -202,9 +203,9 @@ class Reader {
         for (std::byte& b : differences) b = std::byte(sum += std::to_integer<uint8_t>(b));
     }
 
-    // A chunk that ends within a record comes back as it is, for array() to refuse.
+    // Of whole records.
     static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record, bool differences) {
-        if (bytes.empty() || bytes.size() % record != 0) return bytes;
+        if (bytes.empty()) return bytes;
         const size_t count = bytes.size() / record;
         if (differences)
             for (size_t b = 0; b < record; ++b) addUp(std::span(bytes).subspan(b * count, count));

@@ -128,6 +128,10 @@ TEST_F(CachedCook, OfLampsTakenApartTheEditedOneIsMade) {
             .string();
     LevelFile level = houseOfTwo();
     level.addNode({{"name", "ball"}, {"translation", {1, 1, 1}}, {"extras", {{"dimmer_dynamic", true}}}});
+    level.addNode({{"name", "other leaf"},
+                   {"mesh", addRoomMesh(level, {0.2f, 0.2f, 1.2f}, 0.4f, 0)},
+                   {"extras", {{"dimmer_door", "hatch"}}}});
+    level.document["scenes"][0]["extras"]["dimmer_combinations"] = {{"both", "door:flap", "door:hatch"}};
     EXPECT_THAT(made(level), testing::IsSupersetOf({"light set 'one, surfaces'", "light set 'one, lamp lamp1'",
                                                     "light set 'both, lamp lamp2'", "light set 'both, lamp lamp4'",
                                                     "light set 'two'"}));
@@ -137,10 +141,17 @@ TEST_F(CachedCook, OfLampsTakenApartTheEditedOneIsMade) {
     EXPECT_THAT(made(level), ElementsAre("pack"));
     for (json& node : level.document["nodes"])
         if (node.value("name", "") == "lamp4") node["translation"][0] = 9.2;
-    std::vector<std::string> light;
-    for (const std::string& stage : made(level))
-        if (stage.starts_with("light set") || stage.starts_with("always")) light.push_back(stage);
-    EXPECT_THAT(light, ElementsAre("light set 'both, lamp lamp4'"));
+    const auto lightMade = [&] {
+        std::vector<std::string> light;
+        for (const std::string& stage : made(level))
+            if (stage.starts_with("light set") || stage.starts_with("always") || stage == "charts")
+                light.push_back(stage);
+        return light;
+    };
+    EXPECT_THAT(lightMade(), ElementsAre("light set 'both, lamp lamp4'"));
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "lamp4") node["name"] = "renamed";
+    EXPECT_THAT(lightMade(), ElementsAre("light set 'both, lamp renamed'"));
 }
 
 TEST_F(CachedCook, ASetMoreOrLessLeavesTheOthers) {

@@ -199,7 +199,9 @@ TEST(PackDamage, ChunksOutOfPlace) {
         {[&](format::Chunk& c) { c.stored_bytes = whole.size(); }, "past the end"},
         {[](format::Chunk& c) { c.real_bytes = UINT64_MAX; }, "impossible size"},
         // 2 pages of 32 x 32.
-        {[](format::Chunk& c) { c.real_bytes += 1; }, "states 16385 bytes instead of 16384"},
+        {[](format::Chunk& c) { c.real_bytes += 8; }, "states 16392 bytes instead of 16384"},
+        {[](format::Chunk& c) { c.real_bytes += 1; }, "chunk BASE ends within a record"},
+        {[](format::Chunk& c) { c.shuffle = 7; }, "chunk BASE ends within a record"},
         {[](format::Chunk& c) { c.shuffle = 0; }, "impossible size"},
         {[](format::Chunk& c) { c.xxh64 ^= 1; }, "is damaged"},
     };

@@ -113,9 +113,12 @@ TEST(Dissect, WhatCannotBeToldApartIsRefusedAtOnce) {
     VerifyOptions formats{.state = "", .points = 10, .paths_max = 64, .sets = false, .formats = true};
     json denser = json::parse(data->settings_json);
     denser["lightmaps.texels_per_metre"]["value"] = 16;
+    json apart = json::parse(data->settings_json);
+    apart["bake.draft.lamps_apart"]["value"] = 8;
     for (const VerifyOptions& options : {causes, formats}) {
         expectRefused("{}", options, "no quality");  // no level was cooked into it
         expectRefused(denser.dump(), options, "charts are not those of the pack");
+        expectRefused(apart.dump(), options, "cook it with --set bake.draft.lamps_apart=0");
     }
     causes.state = "door:front=1";
     expectRefused(data->settings_json, causes, "closed doors");
