@@ -347,7 +347,7 @@ Expected<void> checkRebake(const Scene& scene, const Pack& pack) {
     if (settings->profile.quality(settings->quality)->lamps_apart == 0) return {};
     return fail(
         ErrorCode::BadInput,
-        fmt::format("{}: causes are told of sets that were baked whole, and the pack's were baked lamp by lamp; "
+        fmt::format("{}: sets are baked again whole to tell errors apart, and the pack's were baked lamp by lamp; "
                     "cook it with --set bake.{}.lamps_apart=0.",
                     scene.file, settings->quality));
 }

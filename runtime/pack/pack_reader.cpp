@@ -7,6 +7,7 @@
 #include <pack/decompress.h>
 #include <pack/mesh_codec.h>
 #include <pack/stored_tables.h>
+#include <pack/unshuffle.h>
 
 #include <fmt/format.h>
 
@@ -180,7 +181,16 @@ class Reader {
         return bad("chunk {} states {} bytes instead of {}", name(type, subject), found->second->real_bytes, bytes);
     }
 
-    Expected<std::vector<std::byte>> load(ChunkType type, uint32_t subject) {
+    // A chunk as the file has it: whole records of `shuffle` bytes, in the shuffle's order.
+    struct Shuffled {
+        std::vector<std::byte> bytes;
+        uint32_t shuffle;
+        bool differences;
+
+        void to(std::span<std::byte> out) const { unshuffle(bytes, shuffle, differences, out); }
+    };
+
+    Expected<Shuffled> load(ChunkType type, uint32_t subject) {
         const auto found = by_name_.find({static_cast<uint32_t>(type), subject});
         if (found == by_name_.end()) return bad("chunk {} is missing", name(type, subject));
         const Chunk& c = *found->second;
@@ -189,7 +199,7 @@ class Reader {
         if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
         auto shuffled = decompressor_.run(stored, c.real_bytes);
         if (!shuffled) return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
-        return unshuffle(std::move(*shuffled), c.shuffle, c.flags & format::chunk_delta);
+        return Shuffled{std::move(*shuffled), c.shuffle, (c.flags & format::chunk_delta) != 0};
     }
 
     Expected<void> checkNothingLeft() const {
@@ -198,44 +208,23 @@ class Reader {
         return bad("chunk {} belongs to nothing", name(c));
     }
 
-    static void addUp(std::span<std::byte> differences) {
-        uint8_t sum = 0;
-        for (std::byte& b : differences) b = std::byte(sum += std::to_integer<uint8_t>(b));
-    }
-
-    // Of whole records.
-    static std::vector<std::byte> unshuffle(std::vector<std::byte> bytes, uint32_t record, bool differences) {
-        if (bytes.empty()) return bytes;
-        const size_t count = bytes.size() / record;
-        if (differences)
-            for (size_t b = 0; b < record; ++b) addUp(std::span(bytes).subspan(b * count, count));
-        if (record == 1) return bytes;
-        std::vector<std::byte> out(bytes.size());
-        // Some kilobytes at a time, so that each is written to memory once.
-        constexpr size_t block = 512;
-        for (size_t begin = 0; begin < count; begin += block) {
-            const size_t end = std::min(begin + block, count);
-            for (size_t b = 0; b < record; ++b)
-                for (size_t i = begin; i < end; ++i) out[i * record + b] = bytes[b * count + i];
-        }
-        return out;
-    }
-
     template <class T>
     Expected<void> array(ChunkType type, std::vector<T>& out, uint32_t subject = 0) {
-        auto bytes = load(type, subject);
-        if (!bytes) return std::unexpected(bytes.error());
-        if (bytes->size() % sizeof(T) != 0) return bad("chunk {} ends within a record", name(type, subject));
+        const auto chunk = load(type, subject);
+        if (!chunk) return std::unexpected(chunk.error());
+        if (chunk->bytes.size() % sizeof(T) != 0) return bad("chunk {} ends within a record", name(type, subject));
         const size_t old = out.size();
-        out.resize(old + bytes->size() / sizeof(T));
-        if (!bytes->empty()) std::memcpy(out.data() + old, bytes->data(), bytes->size());
+        out.resize(old + chunk->bytes.size() / sizeof(T));
+        chunk->to(std::as_writable_bytes(std::span(out).subspan(old)));
         return {};
     }
 
     Expected<void> table(ChunkType type, auto&& parse) {
-        auto bytes = load(type, 0);
-        if (!bytes) return std::unexpected(bytes.error());
-        ByteReader in(*bytes);
+        const auto chunk = load(type, 0);
+        if (!chunk) return std::unexpected(chunk.error());
+        std::vector<std::byte> bytes(chunk->bytes.size());
+        chunk->to(bytes);
+        ByteReader in(bytes);
         parse(in);
         if (!in.atEnd()) return bad("chunk {} is malformed", name(type));
         return {};
