@@ -43,7 +43,7 @@ struct Level {
         emitters = std::make_unique<EmitterSampler>(*rays, mesh_groups);
         // One group everywhere: the least that a gather must look up at a hit.
         outgoing = SparseLight::build(texels.size(), [](size_t begin, size_t end, auto emit) {
-            const TermLight one{always_group, glm::vec3(1)};
+            const TermLight one(always_group, glm::vec3(1), Rounding(begin, Rounding::Of::Outgoing));
             for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>(&one, 1));
         });
     }

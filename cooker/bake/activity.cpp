@@ -100,7 +100,7 @@ void Activity::decide(Series& series) const {
                 const auto row = active.row(i);
                 bool kept = series.active(t, direct, 0);
                 for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
-                    kept = std::ranges::find(row, into, &TermLight::term) != row.end();
+                    kept = std::ranges::find(row, into, term_of) != row.end();
                 if (!kept) sum.of[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
             });
         }).of;
@@ -119,18 +119,20 @@ SparseLight Activity::activeAround(const Series& series) const {
         std::vector<TermLight> row;
         for (size_t i = begin; i < end; ++i) {
             float count = 0;
+            const Rounding rounding(i, Rounding::Of::Around);
             const auto add = [&](size_t receiver) {
                 ++count;
-                for (const TermLight& l : series.bounced.row(receiver)) sum[l.term] += l.value;
+                for (const TermLight& l : series.bounced.row(receiver)) sum[l.term] += l.value();
             };
             if (i < texels)
                 forEachAround(i, add);
             else
                 add(i);
             row.clear();
-            for (const uint32_t t : sum.touched())
-                if (const glm::vec3 mean = sum[t] / count; series.active(t, 0, luminance(mean)))
-                    row.push_back({t, mean});
+            for (const uint32_t t : sum.touched()) {
+                const TermLight mean(t, sum[t] / count, rounding);
+                if (series.active(t, 0, luminance(mean.value()))) row.push_back(mean);
+            }
             sum.clear();
             emit(std::span<const TermLight>(row));
         }
@@ -160,14 +162,14 @@ void Activity::forEachPair(const Series& light, size_t begin, size_t end, auto&&
     for (size_t i = begin; i < end; ++i) {
         here.clear();
         for (const TermLight& l : light.direct.row(i)) {
-            direct[l.term] = luminance(l.value);
+            direct[l.term] = luminance(l.value());
             here.push_back(l.term);
         }
         for (const TermLight& l : light.bounced.row(i)) {
-            bounced[l.term] = luminance(l.value);
+            bounced[l.term] = luminance(l.value());
             here.push_back(l.term);
         }
-        for (const TermLight& l : light.left_to_renderer.row(i)) left_out[l.term] = luminance(l.value);
+        for (const TermLight& l : light.left_to_renderer.row(i)) left_out[l.term] = luminance(l.value());
         std::ranges::sort(here);
         here.erase(std::unique(here.begin(), here.end()), here.end());
         for (const uint32_t t : here) {
@@ -187,7 +189,7 @@ float Series::keepUpTo(size_t receiver, uint32_t term) const {
     float brightest = 0;
     for (const auto* part : {&direct, &bounced})
         for (const TermLight& l : part->row(receiver))
-            if (l.term == term) brightest = std::max(brightest, luminance(l.value));
+            if (l.term == term) brightest = std::max(brightest, luminance(l.value()));
     const float base = term == always_group ? 0 : threshold_base[term];
     return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
 }
@@ -195,9 +197,9 @@ float Series::keepUpTo(size_t receiver, uint32_t term) const {
 void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
     terms.assign(1, always_group);
     for (const TermLight& l : direct.row(receiver))
-        if (l.term != always_group && active(l.term, luminance(l.value), 0)) terms.push_back(l.term);
+        if (l.term != always_group && active(l.term, luminance(l.value()), 0)) terms.push_back(l.term);
     for (const TermLight& l : bounced.row(receiver))
-        if (l.term != always_group && active(l.term, 0, luminance(l.value))) terms.push_back(l.term);
+        if (l.term != always_group && active(l.term, 0, luminance(l.value()))) terms.push_back(l.term);
     std::ranges::sort(terms);
     terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
 }

@@ -39,7 +39,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
             std::erase_if(terms, [&](uint32_t t) { return !groups[gatherer.paths().terms()[t].group]; });
             bounced.clear();
             for (const TermLight& l : series.bounced.row(i))
-                if (luminance(l.value) > 0) bounced.push_back(l.term);
+                if (luminance(l.value()) > 0) bounced.push_back(l.term);
             row.clear();
             own_ends.clear();
             if (known && !terms.empty()) known->get(i, own_ends);
@@ -59,7 +59,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
             std::erase_if(row, [&](const ReceiverLight& l) {
                 const auto lit = series.direct.row(i);
                 return l.term != always_group && l.light.irradiance_lux == glm::vec3(0) &&
-                       std::ranges::find(lit, l.term, &TermLight::term) == lit.end();
+                       std::ranges::find(lit, l.term, term_of) == lit.end();
             });
             for (ReceiverLight& l : row) l.keep = series.keepUpTo(i, l.term);
             emit(std::span<const ReceiverLight>(row));

@@ -374,9 +374,9 @@ void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path)
         if (term == no_term) continue;
         const uint32_t aim = aim_of ? aim_of[term] : 0;
         if (aim != 0)
-            add(ray, path, term, light.value, aim);
+            add(ray, path, term, light.value(), aim);
         else if (ray.aim == 0)
-            sum[term].add(light.value * alone, ray.weights);
+            sum[term].add(light.value() * alone, ray.weights);
     }
 }
 

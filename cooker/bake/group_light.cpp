@@ -11,7 +11,7 @@ ProbeTermLight inTerm(const ProbeTermLight& l, uint32_t term) {
     return {term, l.light, 0, 0};
 }
 TermLight inTerm(const TermLight& l, uint32_t term) {
-    return {term, l.value};
+    return l.in(term);
 }
 
 // Of `group`, whose terms are counted by themselves.
@@ -44,7 +44,7 @@ Sparse<Entry> withParts(const Sparse<Entry>& light, const std::vector<Part<Entry
             row.assign(here.begin(), here.end());
             for (const Part<Entry>& part : parts)
                 for (const Entry& l : part.light->row(i)) row.push_back(inTerm(l, (*part.terms)[l.term]));
-            std::ranges::sort(row, {}, &Entry::term);
+            std::ranges::sort(row, {}, term_of);
             emit(std::span<const Entry>(row));
         }
     });

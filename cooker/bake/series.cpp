@@ -9,8 +9,6 @@
 #include <atomic>
 #include <bit>
 #include <cmath>
-#include <cstddef>
-#include <cstring>
 #include <utility>
 
 namespace dimmer::cook {
@@ -74,9 +72,9 @@ class Expansion {
    private:
     // Moves `sum` to a row.
     template <class Value>
-    static void takeRow(TermAccumulator<Value>& sum, std::vector<TermLight>& row) {
+    static void takeRow(TermAccumulator<Value>& sum, const Rounding& rounding, std::vector<TermLight>& row) {
         row.clear();
-        for (uint32_t t : sum.touched()) row.push_back({t, irradianceOf(sum[t])});
+        for (uint32_t t : sum.touched()) row.emplace_back(t, irradianceOf(sum[t]), rounding);
         sum.clear();
     }
     static glm::vec3 irradianceOf(const Gathered& light) { return light.irradiance_lux; }
@@ -116,11 +114,12 @@ class Expansion {
                 ends.ends.assign(ends_ ? options.rays : 0, RayEnd::unknown);
                 if (known) known->get(i, ends);
                 own_options.row = ends.ends.size() < options.rays ? nullptr : &ends;
+                const Rounding rounding(i, Rounding::Of::Direct);
                 traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full, light_points) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
                     const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;
-                    if (luminance(left) > 0) left_row.push_back({t, left});
+                    if (luminance(left) > 0) left_row.emplace_back(t, left, rounding);
                 }
                 stored_row.clear();
                 for (uint32_t t : full.touched())
@@ -135,7 +134,7 @@ class Expansion {
                 links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
                 door_links.put(i, links.through_doors);
                 doors_seen.put(i, links.doors);
-                takeRow(sum, row);
+                takeRow(sum, rounding, row);
                 direct.put(i, row);
                 left_to_renderer.put(i, left_row);
                 stored.put(i, stored_row);
@@ -164,27 +163,20 @@ class Expansion {
                 for (const auto* part : {&out_.direct, &bounced})
                     for (const TermLight& l : part->row(i)) {
                         const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
-                        if (term != no_term) sum[term] += reflect * l.value;
+                        if (term != no_term) sum[term] += reflect * l.value();
                     }
-                takeRow(sum, row);
+                takeRow(sum, Rounding(i, Rounding::Of::Outgoing), row);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
 
-    // A row's entry as it lies in memory, added up as it is: the term's number is added along, and never read.
     struct Sum {
-        using Four [[gnu::vector_size(16)]] = float;
-        Four entry = {0, 0, 0, 0};
+        TermLight::Four light = {0, 0, 0, 0};
 
-        void operator+=(const TermLight& l) {
-            static_assert(sizeof(TermLight) == sizeof(Four) && offsetof(TermLight, value) == sizeof(float));
-            Four other;
-            std::memcpy(&other, &l, sizeof other);
-            entry += other;
-        }
-        void add(const TermLight& l, float share) { entry += Four{0, l.value.x, l.value.y, l.value.z} * share; }
-        glm::vec3 operator*(float s) const { return glm::vec3(entry[1], entry[2], entry[3]) * s; }
+        void operator+=(const TermLight& l) { light += l.four(); }
+        void add(const TermLight& l, float share) { light += l.four() * share; }
+        glm::vec3 operator*(float s) const { return glm::vec3(light[0], light[1], light[2]) * s; }
     };
 
     // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
@@ -210,14 +202,15 @@ class Expansion {
                 for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
                     addMoved(radiance.row(link.receiver), link.path, own, share_through_doors, sum);
                 row.clear();
+                const Rounding rounding(i, Rounding::Of::Bounced);
                 for (const uint32_t t : sum.touched())
                     if (const glm::vec3 lux = sum[t] * lux_per_radiance; least_.empty() || luminance(lux) >= least_[t])
-                        row.push_back({t, lux});
+                        row.emplace_back(t, lux, rounding);
                 sum.clear();
                 const size_t followed = row.size();
                 for (const TermLight& l : bounced.row(i))
                     if (!runs(l.term)) row.push_back(l);
-                if (row.size() > followed) std::ranges::sort(row, {}, &TermLight::term);
+                if (row.size() > followed) std::ranges::sort(row, {}, term_of);
                 emit(std::span<const TermLight>(row));
             }
         });
@@ -237,7 +230,7 @@ class Expansion {
             auto at = old.begin();
             for (const TermLight& l : after.row(i)) {
                 while (at != old.end() && at->term < l.term) ++at;
-                visit(i, l, at != old.end() && at->term == l.term ? at->value : glm::vec3(0));
+                visit(i, l, at != old.end() && at->term == l.term ? at->value() : glm::vec3(0));
             }
         }
     }
@@ -256,7 +249,7 @@ class Expansion {
         const Sums all = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
             std::vector<float> there(count);  // of each group
             for (size_t i = begin; i < end; ++i) {
-                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value);
+                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value());
                 for (const TermLight& l : out_.bounced.row(i)) {
                     const size_t group = paths_.group(l.term);
                     const float lux = std::exchange(there[group], 0.0f);
@@ -272,12 +265,12 @@ class Expansion {
         const Sums now = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
             std::vector<float> there(count);  // of each group
             for (size_t i = begin; i < end; ++i) {
-                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value);
+                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value());
                 forEachStep(before, out_.bounced, i, i + 1, [&](size_t, const TermLight& l, glm::vec3 old) {
                     const size_t group = paths_.group(l.term);
                     const float share = gatherer_.areaM2(i) / std::max(there[group] + floor_lux[group], 1e-30f);
-                    sum.of[2 * group] += static_cast<double>(share * luminance(l.value));
-                    sum.of[2 * group + 1] += static_cast<double>(share * std::abs(luminance(l.value - old)));
+                    sum.of[2 * group] += static_cast<double>(share * luminance(l.value()));
+                    sum.of[2 * group + 1] += static_cast<double>(share * std::abs(luminance(l.value() - old)));
                 });
                 for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] = 0;
             }
@@ -303,7 +296,8 @@ class Expansion {
             forEachStep(before, out_.bounced, begin, end, [&](size_t i, const TermLight& l, glm::vec3 old) {
                 emitUpTo(i);
                 const double q = runs(l.term) ? groups[paths_.terms()[l.term].group].ratio_at_leap : 0;
-                row.push_back({l.term, glm::max(l.value + static_cast<float>(q / (1 - q)) * (l.value - old), 0.0f)});
+                row.emplace_back(l.term, l.value() + static_cast<float>(q / (1 - q)) * (l.value() - old),
+                                 Rounding(i, Rounding::Of::Foreseen));
             });
             emitUpTo(end);
         });

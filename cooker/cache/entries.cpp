@@ -79,8 +79,8 @@ StoredLight stored(const ReceiverLight& l) {
 const ProbeLight& stored(const ProbeTermLight& l) {
     return l.light;
 }
-const glm::vec3& stored(const TermLight& l) {
-    return l.value;
+glm::vec3 stored(const TermLight& l) {
+    return l.value();
 }
 void restore(const StoredLight& from, ReceiverLight& l) {
     l.light = from.light;
@@ -90,7 +90,8 @@ void restore(const ProbeLight& from, ProbeTermLight& l) {
     l.light = from;
 }
 void restore(const glm::vec3& from, TermLight& l) {
-    l.value = from;
+    static const Rounding any(0, Rounding::Of::Outgoing);  // nothing is left to round
+    l = TermLight(l.term, from, any);
 }
 
 template <class Entry>

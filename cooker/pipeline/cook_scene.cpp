@@ -2,6 +2,8 @@
 #include <pipeline/cook.h>
 
 #include <bake/buried_lights.h>
+#include <bake/door_pairs.h>
+#include <bake/door_paths.h>
 #include <bake/overlap.h>
 #include <bake/sampling.h>
 #include <charts/texels.h>
@@ -58,6 +60,18 @@ void warnOfPlaces(const ChartedLevel& level, CookStats& stats) {
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));
 }
 
+Expected<void> checkTerms(const ChartedLevel& level) {
+    const Scene& scene = level.scene;
+    const uint32_t terms = DoorPaths(scene, doorsInSight(*level.rays)).termCount();
+    if (terms <= terms_max) return {};
+    return fail(ErrorCode::BadInput,
+                fmt::format("{}: its {} doors, those that see each other and what combinations name, make {} "
+                            "contributions with its {} light sets; {} are the most. Name fewer doors in one "
+                            "combination, or a light set with them: each door more makes it three times as many, of "
+                            "every light set where it names none.",
+                            scene.file, scene.doors.size(), terms, scene.light_sets.size(), terms_max));
+}
+
 Baked bakeWithCache(const Receivers& at, BakeSettings settings, Progress& progress, CookCache* cache) {
     const ChartedLevel& level = at.level;
     for (const glm::vec3 scale : level.scales.of_group) settings.group_brightness.push_back(luminance(scale));
@@ -107,6 +121,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         return fail(ErrorCode::BadInput, level.scene.file +
                                              ": every surface lies inside closed geometry, facing inwards; "
                                              "check the winding of the level's triangles");
+    if (auto ok = checkTerms(level); !ok) return std::unexpected(ok.error());
     Baked baked;
     {
         const Stopwatch watch(stats.seconds["bake"]);

@@ -274,7 +274,7 @@ void gatherFalloff(const Rebake& bake, const SamplePoint& from, uint32_t id, std
         if (found == no_index) continue;
         for (const TermLight& l : bake.series.radiance.row(found))
             if (const Term& term = bake.paths->terms()[l.term]; term.doors_open.empty())
-                sum[term.group].add(lux_per_radiance * l.value, d, normals);
+                sum[term.group].add(lux_per_radiance * l.value(), d, normals);
     }
 }
 

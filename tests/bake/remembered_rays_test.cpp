@@ -38,7 +38,8 @@ struct Gathering {
               for (size_t i = begin; i < end; ++i) {
                   row.clear();
                   for (const uint32_t t : {0u, 1u})
-                      row.push_back({t, glm::vec3(unitFloat(hash(static_cast<uint32_t>(i), t)))});
+                      row.emplace_back(t, glm::vec3(unitFloat(hash(static_cast<uint32_t>(i), t))),
+                                       Rounding(i, Rounding::Of::Outgoing));
                   emit(std::span<const TermLight>(row));
               }
           })) {}

@@ -65,6 +65,34 @@ TEST(Cook, RaysOfEveryRoundCount) {
     EXPECT_EQ(stats.rays, 2 * once);
 }
 
+// 3^8 ways for eight doors, of each of 80 light sets: more contributions than a bake can tell apart.
+TEST(Cook, SaysThatCombinationsMakeTooManyContributions) {
+    LevelFile level = twoCells();
+    for (int set = 0; set < 80; ++set) {
+        const int lamp = level.addLight("lamp", {{"type", "point"}, {"intensity", 1}},
+                                        {{"dimmer_light_set", "set" + std::to_string(set)}});
+        level.node(lamp)["translation"] = {1, 1, 1};
+    }
+    const int white = addWhite(level);
+    json names = json::array();
+    for (int d = 0; d < 8; ++d) {
+        const std::string door = "d" + std::to_string(d);
+        level.addNode({{"name", door},
+                       {"mesh", level.addSquareMesh(white)},
+                       {"translation", {0.2 * d, 0.1, 0.1}},
+                       {"scale", {0.1, 0.1, 0.1}},
+                       {"extras", {{"dimmer_door", door}}}});
+        names.push_back("door:" + door);
+    }
+    level.document["scenes"][0]["extras"]["dimmer_combinations"] = json::array({names});
+    const auto pack = cookLevel(level);
+    ASSERT_FALSE(pack);
+    EXPECT_EQ(pack.error().code, ErrorCode::BadInput);
+    // With the three sets of the level and always-on light 84 groups.
+    EXPECT_THAT(pack.error().message, testing::HasSubstr(std::to_string(84 * 6561) + " contributions with its 83"));
+    EXPECT_THAT(pack.error().message, testing::HasSubstr("Name fewer doors"));
+}
+
 // Names of files and folders are not part of a cook.
 TEST(Cook, SameBytesFromAnotherFolder) {
     const TemporaryFolder here, there;
