@@ -74,20 +74,14 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
 
 // Direct light of fully baked lamps joins after the filters: it has no noise, and its shadows have edges, beside which
 // sharpening would leave bright and dark lines.
-Sparse<ReceiverLight> withDirect(const Sparse<ReceiverLight>& gathered, const Sparse<ReceiverLight>& direct,
-                                 const DoorPaths& paths) {
-    return Sparse<ReceiverLight>::build(gathered.rows(), [&](size_t begin, size_t end, auto emit) {
-        std::vector<ReceiverLight> row;
-        for (size_t i = begin; i < end; ++i) {
-            const auto indirect = gathered.row(i);
-            row.assign(indirect.begin(), indirect.end());
-            for (const ReceiverLight& d : direct.row(i)) {
-                auto at = row.end();
-                for (uint32_t t = d.term; at == row.end() && t != no_term; t = paths.lessClosed(t))
-                    at = std::ranges::find(row, t, &ReceiverLight::term);
-                if (at != row.end()) at->light += d.light;
-            }
-            emit(std::span<const ReceiverLight>(row));
+void addDirect(const Sparse<ReceiverLight>& direct, const DoorPaths& paths, Sparse<ReceiverLight>& light) {
+    if (direct.entryCount() == 0) return;
+    light.forEachRow([&](size_t i, std::span<ReceiverLight> row) {
+        for (const ReceiverLight& d : direct.row(i)) {
+            auto at = row.end();
+            for (uint32_t t = d.term; at == row.end() && t != no_term; t = paths.lessClosed(t))
+                at = std::ranges::find(row, t, &ReceiverLight::term);
+            if (at != row.end()) at->light += d.light;
         }
     });
 }
@@ -129,7 +123,7 @@ FollowedLight finishTexels(const Gatherer& gatherer, Series series, const BakeSe
     if (settings.sharpen)
         baked.light =
             sharpen({gatherer.rays(), gatherer.unwrap(), gatherer.texels()}, std::move(baked.light), progress);
-    baked.light = withDirect(baked.light, direct, gatherer.paths());
+    addDirect(direct, gatherer.paths(), baked.light);
     for (size_t i = 0; i < baked.light.rows(); ++i)
         for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;
     baked.bounces = std::ranges::max(followed.bounces);

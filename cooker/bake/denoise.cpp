@@ -10,8 +10,9 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr int passes = 3;                                                 // steps of 1, 2, 4 texels
-constexpr std::array<float, 3> kernel = {3.0f / 8, 1.0f / 4, 1.0f / 16};  // B3 spline, by distance
+constexpr int passes = 3;  // steps of 1, 2, 4 texels
+constexpr int kernel_reach = 2;
+constexpr std::array<float, kernel_reach + 1> kernel = {3.0f / 8, 1.0f / 4, 1.0f / 16};  // B3 spline, by distance
 
 // A texel counts by exp(-(d^2 / k^2) / 2) of its difference d, in standard deviations of the noise of both: of the two
 // texels, and of the means around them, whose noise is a third of that and tells gradients from noise. Where light
@@ -95,10 +96,10 @@ class LightmapFilter {
     }
 
     // `row`: the receiver's, as it is in the light.
-    void filter(size_t receiver, std::vector<ReceiverLight>& row) const {
+    void filter(size_t receiver, std::span<ReceiverLight> row) const {
         std::vector<Sum> sums(row.size());
-        for (int dy = -2; dy <= 2; ++dy)
-            for (int dx = -2; dx <= 2; ++dx) {
+        for (int dy = -kernel_reach; dy <= kernel_reach; ++dy)
+            for (int dx = -kernel_reach; dx <= kernel_reach; ++dx) {
                 const uint32_t other = surface_.neighbour(receiver, dx * step_, dy * step_);
                 if (other == no_index) continue;
                 const float spatial =
@@ -148,31 +149,41 @@ class LightmapFilter {
     Sparse<float> means_;  // of the luminance around each entry of light_
 };
 
+// Per block of receivers, which ascend along rows of pages: the last one with receivers at most `reach` rows further.
+std::vector<uint32_t> lastReaders(const Texels& texels, int reach) {
+    const auto rowOf = [](uint32_t address) {
+        return uint64_t{TexelAddress::page(address)} << 32 | TexelAddress::y(address);
+    };
+    std::vector<uint32_t> last(blockCount(texels.size()));
+    for (size_t b = 0; b < last.size(); ++b) {
+        const size_t end = std::min((b + 1) * rows_per_block, texels.size());
+        const auto further = std::ranges::upper_bound(
+            texels.address, rowOf(texels.address[end - 1]) + static_cast<uint64_t>(reach), {}, rowOf);
+        last[b] = static_cast<uint32_t>((further - texels.address.begin() - 1) / rows_per_block);
+    }
+    return last;
+}
+
 }  // namespace
 
 Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
                               Progress& progress) {
     progress.stage("denoise", texels.size() * (passes + 1));
     const Surface surface(unwrap, texels);
-    const auto run = [&](auto&& filter_row) {
-        light = Sparse<ReceiverLight>::build(texels.size(), [&](size_t begin, size_t end, auto emit) {
-            std::vector<ReceiverLight> row;
-            for (size_t i = begin; i < end; ++i) {
-                const auto here = light.row(i);
-                row.assign(here.begin(), here.end());
-                filter_row(i, row);
-                emit(std::span<const ReceiverLight>(row));
-            }
+    const auto run = [&](int reach, auto&& filter_row) {
+        light.rewrite(lastReaders(texels, reach), [&](size_t begin, size_t end, auto row_of) {
+            for (size_t i = begin; i < end; ++i) filter_row(i, row_of(i));
             progress.advance(end - begin);
         });
     };
-    run([&](size_t i, auto& row) {
+    run(mean_reach, [&](size_t i, std::span<ReceiverLight> row) {
         std::vector<float> counts;
         surface.addAround(light, i, counts, [&](size_t k, const ReceiverLight& o) { row[k].variance += o.variance; });
         for (size_t k = 0; k < row.size(); ++k) row[k].variance /= counts[k];
     });
     for (int pass = 0; pass < passes; ++pass)
-        run([filter = LightmapFilter(surface, light, 1 << pass)](size_t i, auto& row) { filter.filter(i, row); });
+        run(kernel_reach << pass, [filter = LightmapFilter(surface, light, 1 << pass)](
+                                      size_t i, std::span<ReceiverLight> row) { filter.filter(i, row); });
     return light;
 }
 

@@ -3,6 +3,7 @@
 #include <bake/sampling.h>
 
 #include <algorithm>
+#include <atomic>
 
 namespace dimmer::cook {
 namespace {
@@ -28,21 +29,48 @@ void move(ReceiverLight& texel, const Step& step) {
     texel.light.tilted_lux = glm::max(texel.light.tilted_lux, 0.0f);
 }
 
+// Receivers that lie so many blocks before one that they are shown beside: over a seam, padding shows any place.
+constexpr uint32_t near_blocks = 256;
+bool isFarBehind(size_t receiver, size_t reader) {
+    return reader / rows_per_block > receiver / rows_per_block + near_blocks;
+}
+
+// The rows of those.
+Sparse<ReceiverLight> farBehind(const BilinearTaps& taps, const Sparse<ReceiverLight>& light) {
+    std::vector<std::atomic<bool>> far(light.rows());
+    forEachBlock(light.rows(), [&](size_t begin, size_t end) {
+        std::vector<Tap> around;
+        for (size_t i = begin; i < end; ++i) {
+            taps.around(static_cast<uint32_t>(i), around);
+            for (const Tap& tap : around)
+                if (isFarBehind(tap.receiver, i)) far[tap.receiver] = true;
+        }
+    });
+    return Sparse<ReceiverLight>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
+        for (size_t i = begin; i < end; ++i) emit(far[i] ? light.row(i) : std::span<const ReceiverLight>());
+    });
+}
+
 }  // namespace
 
-Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, const Sparse<ReceiverLight>& light, Progress& progress) {
+Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, Sparse<ReceiverLight> light, Progress& progress) {
     progress.stage("sharpen", light.rows());
-    return Sparse<ReceiverLight>::build(light.rows(), [&](size_t begin, size_t end, auto emit) {
-        std::vector<ReceiverLight> row;
+    const Sparse<ReceiverLight> far = farBehind(taps, light);
+    std::vector<uint32_t> last_reader(blockCount(light.rows()), near_blocks);
+    for (size_t b = 0; b < last_reader.size(); ++b) last_reader[b] += static_cast<uint32_t>(b);
+    const auto rowOf = [&](size_t receiver, size_t reader) {
+        return isFarBehind(receiver, reader) ? far.row(receiver) : light.row(receiver);
+    };
+    light.rewrite(last_reader, [&](size_t begin, size_t end, auto row_of) {
         std::vector<Step> steps;
         std::vector<Tap> around;
         for (size_t i = begin; i < end; ++i) {
             const auto here = light.row(i);
-            row.assign(here.begin(), here.end());
+            const std::span<ReceiverLight> row = row_of(i);
             steps.assign(row.size(), {});
             if (!row.empty()) taps.around(static_cast<uint32_t>(i), around);
             for (size_t n = 1; !row.empty() && n < around.size(); ++n)
-                forEachCommonTerm(here, light.row(around[n].receiver), [&](size_t k, const ReceiverLight& there) {
+                forEachCommonTerm(here, rowOf(around[n].receiver, i), [&](size_t k, const ReceiverLight& there) {
                     const float weight = around[n].weight;
                     steps[k].light += here[k].light * weight;
                     steps[k].light += there.light * -weight;
@@ -50,10 +78,10 @@ Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, const Sparse<ReceiverLig
                     steps[k].variance += weight * weight * there.variance;
                 });
             for (size_t k = 0; k < row.size(); ++k) move(row[k], steps[k]);
-            emit(std::span<const ReceiverLight>(row));
         }
         progress.advance(end - begin);
     });
+    return light;
 }
 
 }  // namespace dimmer::cook

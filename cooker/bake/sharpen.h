@@ -12,6 +12,6 @@ namespace dimmer::cook {
 // where light is of the second degree across whole texels. Of a step, the share that its noise explains is left out
 // (as James and Stein shrink an estimate), and no texel loses more than half. Terms are sharpened apart; a neighbour
 // without the term asks for no step. Linear in time and in entries; deterministic.
-Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, const Sparse<ReceiverLight>& light, Progress& progress);
+Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, Sparse<ReceiverLight> light, Progress& progress);
 
 }  // namespace dimmer::cook

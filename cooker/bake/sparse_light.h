@@ -16,6 +16,7 @@
 #include <glm/glm.hpp>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace dimmer::cook {
@@ -137,6 +138,37 @@ class Sparse {
         });
     }
 
+    // change(i, entries) for every row, in parallel.
+    void forEachRow(auto&& change) {
+        forEachBlock(rows(), [&](size_t begin, size_t end) {
+            for (size_t i = begin; i < end; ++i) change(i, rowIn(blocks_[begin / rows_per_block], i));
+        });
+    }
+
+    // Fills rows anew, in parallel, from what all of them were: fill(begin, end, rowOf) for each block, where rowOf(i)
+    // are the entries of row i to begin with and may be changed, and row() is as it was. `last_reader`: per block, the
+    // last one whose rows are made from its own. After that it is replaced: only what lies in between is there twice.
+    template <class Fill>
+    void rewrite(std::span<const uint32_t> last_reader, Fill&& fill) {
+        constexpr size_t blocks_at_once = 256;
+        std::vector<std::vector<Entry>> fresh(blocks_.size());
+        std::vector<uint32_t> replaced(blocks_.size());  // in this order
+        std::iota(replaced.begin(), replaced.end(), 0u);
+        std::ranges::stable_sort(replaced, {}, [&](uint32_t b) { return std::max(b, last_reader[b]); });
+        auto next = replaced.begin();
+        for (size_t first = 0; first < blocks_.size(); first += blocks_at_once) {
+            const size_t last = std::min(first + blocks_at_once, blocks_.size());
+            tbb::parallel_for(first, last, [&](size_t b) {
+                fresh[b] = blocks_[b];
+                const size_t begin = b * rows_per_block, end = std::min(begin + rows_per_block, rows());
+                fill(begin, end, [&](size_t i) { return rowIn(fresh[b], i); });
+            });
+            for (; next != replaced.end() && (std::max(*next, last_reader[*next]) < last || last == blocks_.size());
+                 ++next)
+                blocks_[*next] = std::exchange(fresh[*next], {});
+        }
+    }
+
     // Collects rows block by block; blocks may be filled in parallel, the result does not depend on how.
     class Builder {
        public:
@@ -186,6 +218,11 @@ class Sparse {
     }
 
    private:
+    std::span<Entry> rowIn(std::vector<Entry>& block, size_t i) const {
+        const size_t begin = i % rows_per_block == 0 ? 0 : ends_[i];
+        return std::span(block).subspan(begin, ends_[i + 1] - begin);
+    }
+
     static constexpr size_t rows_per_word = 64;
     static_assert(rows_per_block % rows_per_word == 0, "blocks share no word");
 

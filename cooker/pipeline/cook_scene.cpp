@@ -12,6 +12,7 @@
 #include <pipeline/cook_settings.h>
 #include <pipeline/cook_warnings.h>
 #include <pipeline/encode_pack.h>
+#include <pipeline/free_memory.h>
 #include <pipeline/lamps_apart.h>
 
 #include <fmt/format.h>
@@ -143,6 +144,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     PackData pack;
     {
         const Stopwatch watch(stats.seconds["encode"]);
+        giveBackFreeMemory();
         progress.stage("encode", 1);
         pack = encodePack(level, at.texels, baked, profile, quality_name, stats);
         progress.advance(1);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bake/progress.h>
+#include <pipeline/free_memory.h>
 
 #include <algorithm>
 #include <chrono>
@@ -13,7 +14,8 @@ namespace dimmer::cook {
 
 using StageSeconds = std::vector<std::pair<std::string, double>>;
 
-// Passes everything on. One thread starts stages; any advance them.
+// Passes everything on, and gives back what the stage before no longer needs. One thread starts stages; any advance
+// them.
 class StageTimer final : public Progress {
    public:
     StageTimer(Progress& progress, StageSeconds& seconds) : progress_(progress), seconds_(seconds) {}
@@ -23,6 +25,7 @@ class StageTimer final : public Progress {
 
     void stage(std::string_view name, uint64_t total) override {
         endStage();
+        giveBackFreeMemory();
         name_ = name;
         progress_.stage(name, total);
     }

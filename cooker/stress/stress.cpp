@@ -1,12 +1,10 @@
 #include <stress/stress.h>
 
+#include <pipeline/free_memory.h>
 #include <stress/executors.h>
 
 #include <fmt/format.h>
 #include <format/probe.h>
-#ifdef __GLIBC__
-#include <malloc.h>
-#endif
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,9 +20,7 @@ constexpr size_t words_per_probe = sizeof(ProbeRecord) / sizeof(uint32_t);
 // Of this process, from the second field of Linux's /proc/self/statm, in pages; 0 elsewhere. What the allocator merely
 // keeps from the last check's fresh blend is given back first.
 uint64_t residentBytes() {
-#ifdef __GLIBC__
-    malloc_trim(0);
-#endif
+    giveBackFreeMemory();
     std::ifstream statm("/proc/self/statm");
     uint64_t all = 0, resident = 0;
     statm >> all >> resident;
