@@ -19,7 +19,9 @@ float shadowEnd(float distance_m) {
     constexpr float share = 1e-4f, most_m = 1e-3f, rounding = 2e-6f;
     return distance_m - std::max(std::min(share * distance_m, most_m), rounding * distance_m);
 }
-// Where rays end is known before the light there is asked for: so many rays ahead it begins to load.
+// Rays end anywhere, and light there takes as long to come from memory as a ray takes to trace: it is asked for when so
+// many rays have been traced. Where ends are known, whether any is wanted is asked before: so many rays ahead it begins
+// to load.
 constexpr uint32_t rays_ahead = 8;
 
 // Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
@@ -100,8 +102,38 @@ struct Gatherer::Ray {
     uint32_t aim;       // whose ray this is, as DoorAims::of_term has it; 0: a ray by the intake
     uint32_t i, point;  // in this gather; of the receiver
     glm::vec3 origin, world, tangent;
-    AimShares& shares;
+    Batch<Light>& batch;
+    mutable AimShares shares{};  // of no ray but this one
     typename Light::Weights weights = Light::weightsOf(tangent);
+};
+
+// Rays that were traced, and where they read light, in order. What known and traced rays read is added up in one order:
+// remembered rays give the same sums.
+template <class Light>
+struct Gatherer::Batch {
+    struct End {
+        uint32_t ray, receiver, path;
+    };
+    // A receiver for each leaf that a ray meets, and one behind them.
+    static constexpr uint32_t ends_max = rays_ahead * (LeafHits::max + 1);
+
+    explicit Batch(const Gatherer& of) : gatherer(of) {}
+
+    // For its ray, until the next flush.
+    std::optional<Ray<Light>>& next() {
+        if (rays == rays_ahead) flush();
+        return traced[rays++];
+    }
+    void readLater(uint32_t receiver, uint32_t path) { ends[count++] = {rays - 1, receiver, path}; }
+    void flush() {
+        for (uint32_t e = 0; e < count; ++e) gatherer.takeFrom(*traced[ends[e].ray], ends[e].receiver, ends[e].path);
+        rays = count = 0;
+    }
+
+    const Gatherer& gatherer;
+    uint32_t rays = 0, count = 0;
+    std::array<std::optional<Ray<Light>>, rays_ahead> traced;
+    std::array<End, ends_max> ends;
 };
 
 TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
@@ -126,6 +158,7 @@ template <class Light>
 void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
                       TermAccumulator<Light>& sum, GatherLinks* links, const DoorAims& aims) const {
     const uint32_t seed = hash(options.seed, from.id);
+    Batch<Light> batch(*this);
     for (uint32_t i = 0; i < options.rays + (rays_.anyLeaf() ? options.door_rays : 0); ++i) {
         const uint32_t index = options.first_ray + i;
         const bool remembered = options.row && i < options.rays && index < options.row->ends.size();
@@ -145,14 +178,13 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         const TangentFrame frame = frameOf(origin);
         const glm::vec3 d = Light::Intake::direction(sequence2d(index, seed));
         const glm::vec3 world = frame.tangent * d.x + frame.bitangent * d.y + frame.normal * d.z;
-        AimShares shares;
-        const Ray<Light> ray{from, options, outgoing,          sum,   links, aims,  0,
-                             i,    point,   origin.position_m, world, d,     shares};
+        const Ray<Light>& ray = batch.next().emplace(from, options, outgoing, sum, links, aims, 0u, i, point,
+                                                     origin.position_m, world, d, batch);
         for (const PathEnd& p : known)
             if (p.end == RayEnd::sky)
                 takeSky(ray, p.path);
             else if (outgoing)
-                takeFrom(ray, p.end, p.path);
+                batch.readLater(p.end, p.path);
         if (!known.empty()) continue;
         // Links have other uses for leaves.
         const bool remember = end == RayEnd::unknown;
@@ -162,7 +194,8 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
         options.row->next = options.row->through.size();
     }
     for (size_t a = 0; a < aims.all.size(); ++a)
-        if (aims.wanted[a] > 0) gatherAimed(from, options, outgoing, sum, aims, a);
+        if (aims.wanted[a] > 0) gatherAimed(from, options, outgoing, sum, aims, a, batch);
+    batch.flush();
     if (!emitters_.empty() && options.emitter_samples > 0) sampleEmitters(from, options, sum);
     if (!sky_.empty() && options.emitter_samples > 0) sampleSky(from, options, sum);
 }
@@ -182,7 +215,7 @@ DoorAim Gatherer::aimAt(const GatherFrom& from, uint32_t guide) const {
 
 template <class Light>
 void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                           TermAccumulator<Light>& sum, const DoorAims& aims, size_t a) const {
+                           TermAccumulator<Light>& sum, const DoorAims& aims, size_t a, Batch<Light>& batch) const {
     const DoorAim& aim = aims.all[a];
     // Seeded by the guide alone: what else is aimed at does not change its noise.
     const uint32_t seed = hash(hash(options.seed ^ 0x1b873593u, from.id), guides_->identity(aim.guide));
@@ -197,10 +230,9 @@ void Gatherer::gatherAimed(const GatherFrom& from, const GatherOptions& options,
         const glm::vec3 world = guide.sample(u.z, {u.x, u.y});
         const glm::vec3 d = toTangent(origin, world);
         if (!(Light::Intake::weight(d) > 0)) continue;
-        AimShares shares;
-        follow<Light>({from, options, outgoing, sum, nullptr, aims, static_cast<uint32_t>(a + 1), options.rays + i,
-                       point, origin.position_m, world, d, shares},
-                      seed + index);
+        follow(batch.next().emplace(from, options, outgoing, sum, nullptr, aims, static_cast<uint32_t>(a + 1),
+                                    options.rays + i, point, origin.position_m, world, d, batch),
+               seed + index);
     }
 }
 
@@ -354,7 +386,9 @@ uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) co
     if (found == no_index) return no_index;
     if (ray.links && path == free_path) ray.links->hits[ray.i] = found;
     if (ray.links && path != free_path) ray.links->through_doors.push_back({found, path});
-    if (ray.outgoing) takeFrom(ray, found, path);
+    if (!ray.outgoing) return found;
+    ray.outgoing->prefetch(found);
+    ray.batch.readLater(found, path);
     return found;
 }
 

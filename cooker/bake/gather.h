@@ -245,6 +245,8 @@ class Gatherer {
     template <class Light>
     struct Ray;
     template <class Light>
+    struct Batch;
+    template <class Light>
     uint32_t throughLeaves(const Ray<Light>& ray, const LeafHits& leaves, LeavesMet& met) const;
     template <class Light>
     uint32_t take(const Ray<Light>& ray, const Hit& hit, uint32_t path) const;
@@ -261,7 +263,7 @@ class Gatherer {
     uint32_t follow(const Ray<Light>& ray, uint32_t seed, std::vector<PathEnd>* through = nullptr) const;
     template <class Light>
     void gatherAimed(const GatherFrom& from, const GatherOptions& options, const SparseLight* outgoing,
-                     TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim) const;
+                     TermAccumulator<Light>& sum, const DoorAims& aims, size_t aim, Batch<Light>& batch) const;
     template <class Light>
     float shareOf(const Ray<Light>& ray, uint32_t path, uint32_t aim) const;
     template <class Light>
