@@ -75,8 +75,10 @@ struct TermLight {
         constexpr uint32_t upper = 16, first = term_bits - upper;
         const auto bits = std::bit_cast<uint64_t>(*this);
         const Longs lanes =
-            Longs{bits, bits, bits, bits} >> Longs{first, first + channel_bits, first + 2 * channel_bits, 63};
-        const auto words = std::bit_cast<Words>(lanes & (uint64_t{0x7fff} << upper));
+            (Longs{bits, bits, bits, bits} >> Longs{first, first + channel_bits, first + 2 * channel_bits, 63}) &
+            (uint64_t{0x7fff} << upper);
+        Words words;
+        std::memcpy(&words, &lanes, sizeof words);  // bit_cast would return what not every processor has registers for
         return std::bit_cast<Four>(__builtin_shufflevector(words, words, 0, 2, 4, 6));
     }
 
