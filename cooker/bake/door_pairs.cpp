@@ -138,33 +138,42 @@ std::vector<DoorIndices> doorsInSight(const RayScene& rays) {
 }
 
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links) {
+                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links,
+                               uint32_t terms_at_once) {
     const Scene& scene = gatherer.rays().scene();
-    Scene named = scene;
-    const auto pairs = seenTogether(scene, series.doors_seen, gatherer.paths().groupCount());
+    const auto seen = seenTogether(scene, series.doors_seen, gatherer.paths().groupCount());
+    const std::vector<DoorIndices> pairs(seen.begin(), seen.end());
     std::vector<DoorFlux> flux(groups.size());
     if (pairs.empty()) return flux;
-    for (const DoorIndices& pair : pairs) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
-    const DoorPaths paths(named, doorsInSight(gatherer.rays()));
-    const Gatherer keeping_pairs(gatherer, paths);
-    const std::vector<double> measured =
-        termFlux(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
-
+    const auto in_sight = doorsInSight(gatherer.rays());
     for (DoorFlux& f : flux) {
-        f.alone.resize(named.doors.size());
+        f.alone.resize(scene.doors.size());
         for (const DoorIndices& pair : pairs) f.pairs.push_back({pair.first, pair.second});
     }
-    for (uint32_t t = 0; t < paths.termCount(); ++t) {
-        const Term& term = paths.terms()[t];
-        const auto doors = doorsOf(term);
-        const double energy = measured[t];
-        DoorFlux& f = flux[term.group];
-        for (const uint32_t door : doors)
-            if (term.doors_open.empty() || term.doors_open == std::vector{door}) f.alone[door] += energy;
-        if (doors.size() != 2 || term.doors_open.empty()) continue;
-        const auto pair = pairs.find({doors[0], doors[1]});
-        if (pair != pairs.end() && !covered(scene, *pair, term.group))
-            f.pairs[static_cast<size_t>(std::distance(pairs.begin(), pair))].flux += energy;
+    // As many pairs together as there are numbers for their terms.
+    const size_t own = gatherer.paths().termCount(), of_pair = pairTerms(gatherer.paths().groupCount());
+    const size_t at_once = std::max<size_t>(1, (std::max<size_t>(terms_at_once, own) - own) / of_pair);
+    for (size_t first = 0; first < pairs.size(); first += at_once) {
+        const auto some = std::span(pairs).subspan(first, std::min(at_once, pairs.size() - first));
+        Scene named = scene;
+        for (const DoorIndices& pair : some) named.combinations.push_back({{true, pair.first}, {true, pair.second}});
+        const DoorPaths paths(named, in_sight);
+        const Gatherer keeping_pairs(gatherer, paths);
+        const std::vector<double> measured =
+            termFlux(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
+        for (uint32_t t = 0; t < paths.termCount(); ++t) {
+            const Term& term = paths.terms()[t];
+            const auto doors = doorsOf(term);
+            const double energy = measured[t];
+            DoorFlux& f = flux[term.group];
+            for (const uint32_t door : doors)
+                if (first == 0 && (term.doors_open.empty() || term.doors_open == std::vector{door}))
+                    f.alone[door] += energy;
+            if (doors.size() != 2 || term.doors_open.empty()) continue;
+            const auto pair = std::ranges::lower_bound(some, DoorIndices(doors[0], doors[1]));  // they ascend
+            if (pair != some.end() && *pair == DoorIndices(doors[0], doors[1]) && !covered(scene, *pair, term.group))
+                f.pairs[first + static_cast<size_t>(pair - some.begin())].flux += energy;
+        }
     }
     return flux;
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cfloat>
 #include <cstdint>
 #include <cstring>
@@ -50,7 +51,9 @@ struct TermLight {
         : term(term_number),
           red(rounded(value.x, rounding[0])),
           green(rounded(value.y, rounding[1])),
-          blue(rounded(value.z, rounding[2])) {}
+          blue(rounded(value.z, rounding[2])) {
+        assert(term == term_number);
+    }
 
     uint64_t term : term_bits = 0;
     uint64_t red : channel_bits = 0, green : channel_bits = 0, blue : channel_bits = 0;

@@ -63,8 +63,9 @@ void warnOfPlaces(const ChartedLevel& level, CookStats& stats) {
 
 Expected<void> checkTerms(const ChartedLevel& level) {
     const Scene& scene = level.scene;
-    const uint32_t terms = DoorPaths(scene, doorsInSight(*level.rays)).termCount();
-    if (terms <= terms_max) return {};
+    const DoorPaths paths(scene, doorsInSight(*level.rays));
+    const size_t terms = paths.termCount();
+    if (terms + pairTerms(paths.groupCount()) <= terms_max) return {};  // a bake measures pairs besides
     return fail(ErrorCode::BadInput,
                 fmt::format("{}: its {} doors, those that see each other and what combinations name, make {} "
                             "contributions with its {} light sets; {} are the most. Name fewer doors in one "

@@ -428,6 +428,48 @@ TEST(Doors, PairsThatDependOnEachOtherAreFound) {
     EXPECT_NEAR(static_cast<double>(first.loss) / (off / std::min(alone[0], alone[1])), 1, 0.1);
 }
 
+// Pairs that do not fit into one series with all others are measured by several. Two rooms with two doors each, so that
+// no light asks for doors of both pairs (where that counts depends on which pairs are kept together): the same paths,
+// and what is left is how light is rounded and thresholds fall out.
+TEST(Doors, PairsAreMeasuredTheSameOneByOne) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    scene.doors = {{"a", false}, {"b", false}, {"c", false}, {"d", false}};
+    scene.light_sets = {{"lamp", 1}, {"other", 1}};
+    for (uint32_t room = 0; room < 2; ++room) {
+        const float away_m = 10 * static_cast<float>(room);
+        addBox(scene, {3, 1, 1}, white);
+        for (glm::vec3& p : scene.meshes.back().positions_m) p.z += away_m;
+        for (uint32_t d = 0; d < 2; ++d)
+            addSolid(scene, "leaf", {-1 + 2 * static_cast<float>(d), 0, away_m}, {0.1f, 1, 1}, white, 2 * room + d);
+        addPointLight(scene, {-0.2f, 0.2f, 0.1f + away_m}, 100, BakeMode::Full).light_set = room;
+    }
+    const BakedScene b(scene);
+    const EmitterSampler emitters(*b.rays, meshGroups(scene));
+    const DoorPaths paths(scene, doorsInSight(*b.rays));
+    const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
+    const BakeSettings settings{.series_rays = 32, .final_rays = 1};
+    SilentProgress quiet;
+    const Series series = expandSeries(gatherer, settings, quiet);
+    const std::vector<uint8_t> all(paths.groupCount(), 1);
+    const auto together = doorFlux(gatherer, series, settings, all, quiet),
+               one_by_one = doorFlux(gatherer, series, settings, all, quiet, nullptr, 0);
+    size_t compared = 0;
+    ASSERT_EQ(together.size(), one_by_one.size());
+    for (size_t g = 0; g < together.size(); ++g) {
+        ASSERT_GE(together[g].pairs.size(), 2u);
+        ASSERT_EQ(together[g].pairs.size(), one_by_one[g].pairs.size());
+        for (size_t p = 0; p < together[g].pairs.size(); ++p) {
+            const double flux = together[g].pairs[p].flux;
+            EXPECT_NEAR(one_by_one[g].pairs[p].flux, flux, 0.01 * flux) << g << " " << p;
+            compared += flux > 0;
+        }
+        for (size_t d = 0; d < scene.doors.size(); ++d)
+            EXPECT_NEAR(one_by_one[g].alone[d], together[g].alone[d], 0.01 * together[g].alone[d]) << g << " " << d;
+    }
+    EXPECT_GT(compared, 1u);
+}
+
 // Three rooms in a row, lit in the first alone: the second door by itself changes nothing, and the last room is black
 // unless the two are named.
 TEST(Doors, APairIsFoundWhereOneOfThemAloneChangesNothing) {
