@@ -53,8 +53,8 @@ std::vector<TermReport> Activity::thresholds(const Series& light, float most) co
         TermReport& report = reports[t];
         report.measured_over = static_cast<uint64_t>(around.receivers.of[t]);
         if (report.measured_over > 0) report.mean_lux = static_cast<float>(around.lux.of[t] / around.receivers.of[t]);
-        if (t == always_group) continue;
         const Term& term = paths_.terms()[t];
+        if (term.free() && isAlwaysOn(gatherer_.rays().scene(), term.group)) continue;
         const float base = term.free() ? report.mean_lux : doorBase(term, reports[term.group].mean_lux, around.doors);
         report.threshold_lux = std::min(settings_.thresholdOf(term.group), most) * base;
     }

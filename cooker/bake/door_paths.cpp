@@ -83,6 +83,10 @@ Term makeTerm(uint32_t group, const Conditions& conditions) {
 
 }  // namespace
 
+bool isAlwaysOn(const Scene& scene, uint32_t group) {
+    return group == always_group || scene.light_sets[group - 1].always_on;
+}
+
 uint32_t groupIdentity(const Scene& scene, uint32_t group) {
     if (group == always_group) return 0;
     uint32_t id = 1;

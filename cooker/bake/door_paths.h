@@ -36,6 +36,9 @@ inline uint32_t groupOf(std::optional<uint32_t> light_set) {
     return light_set ? 1 + *light_set : always_group;
 }
 
+// Whether the group can never be off: light set or not (pipeline/lamps_apart.h).
+bool isAlwaysOn(const Scene& scene, uint32_t group);
+
 // A number of the group's own for seeds: from its set's name, so that other sets, added or removed, change no noise.
 uint32_t groupIdentity(const Scene& scene, uint32_t group);
 

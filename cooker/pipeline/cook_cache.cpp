@@ -375,7 +375,9 @@ bool CookCache::removeKeptFor(const std::filesystem::path& folder, uint64_t byte
 }
 
 std::string describeGroup(const Scene& scene, uint32_t group) {
-    return group == always_group ? "always-on light" : fmt::format("light set '{}'", scene.light_sets[group - 1].name);
+    if (group == always_group) return "always-on light";
+    const SceneLightSet& set = scene.light_sets[group - 1];
+    return set.always_on ? set.name : fmt::format("light set '{}'", set.name);
 }
 
 std::optional<GroupLight> CachedGroups::find(uint32_t group) {

@@ -226,6 +226,10 @@ struct Falloff {
         for (size_t i = 0; i < normals.size(); ++i)
             tilted_lux[i] += lux * (std::max(0.0f, glm::dot(normals[i], direction)) / direction.z);
     }
+    void multiply(glm::vec3 scale) {
+        light = multiplied(light, scale);
+        for (glm::vec3& lux : tilted_lux) lux *= scale;
+    }
 };
 
 // Spread over the cap of 60 degrees, the same everywhere but for a turn about the surface's normal.
@@ -384,6 +388,7 @@ Expected<std::vector<FormatError>> formatErrors(const Scene& scene, const Pack& 
         TermAccumulator<Falloff> sum(group_count);
         const auto normals = tiltedNormals(static_cast<uint32_t>(i));
         gatherFalloff(**bake, *footprint.centre, static_cast<uint32_t>(i), normals, sum);
+        for (const uint32_t g : sum.touched()) sum[g].multiply((*bake)->level->scales.of_group[g]);
         at[i] = storages(pack.exposure());
         for (Storage& s : at[i]) measureStorage(s, sum, normals);
     });

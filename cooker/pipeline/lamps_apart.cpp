@@ -18,20 +18,20 @@ bool emits(const Scene& scene, const SceneMesh& mesh) {
                                [&](uint32_t m) { return scene.materials[m].emission_cd_m2 != glm::vec3(0); });
 }
 
-// A set's lamps that are baked, and whether it has emissive surfaces.
-struct SetParts {
+// A light group's lamps that are baked, and whether it has emissive surfaces or the sky.
+struct GroupParts {
     std::vector<uint32_t> lamps;
     bool surfaces = false;
     size_t count() const { return lamps.size() + surfaces; }
 };
 
-std::vector<SetParts> partsOfSets(const Scene& scene) {
-    std::vector<SetParts> parts(scene.light_sets.size());
+std::vector<GroupParts> partsOfGroups(const Scene& scene) {
+    std::vector<GroupParts> parts(1 + scene.light_sets.size());
     for (uint32_t l = 0; l < scene.lights.size(); ++l)
-        if (scene.lights[l].light_set && scene.lights[l].bake != BakeMode::None)
-            parts[*scene.lights[l].light_set].lamps.push_back(l);
+        if (scene.lights[l].bake != BakeMode::None) parts[groupOf(scene.lights[l].light_set)].lamps.push_back(l);
     for (const SceneMesh& mesh : scene.meshes)
-        if (mesh.light_set && emits(scene, mesh)) parts[*mesh.light_set].surfaces = true;
+        if (emits(scene, mesh)) parts[groupOf(mesh.light_set)].surfaces = true;
+    if (scene.sky_radiance_cd_m2 != glm::vec3(0)) parts[always_group].surfaces = true;
     return parts;
 }
 
@@ -113,60 +113,74 @@ std::vector<TermReport> wholeReports(const WholeTerms& terms, const SetScales& s
 }  // namespace
 
 std::vector<float> LampGroups::ofParts(const std::vector<float>& of_groups) const {
-    if (sets.empty()) return of_groups;
+    if (none()) return of_groups;
     std::vector<float> out;
     for (const uint32_t g : whole) out.push_back(of_groups[g]);
     return out;
 }
 
 LampGroups takeLampsApart(Scene& scene, uint32_t lamps_max) {
-    const std::vector<SetParts> parts = partsOfSets(scene);
-    const auto isApart = [&](const SetParts& p) { return p.count() > 1 && p.count() <= lamps_max; };
+    const std::vector<GroupParts> parts = partsOfGroups(scene);
+    const auto isApart = [&](const GroupParts& p) { return p.count() > 1 && p.count() <= lamps_max; };
     LampGroups out;
     if (std::ranges::none_of(parts, isApart)) return out;
     out.whole = {always_group};
-    std::vector<std::vector<uint32_t>> parts_of(scene.light_sets.size());  // into the new sets
+    std::vector<std::vector<uint32_t>> parts_of(parts.size());  // into the new sets
+    std::vector<std::optional<uint32_t>> set_of_lamp(scene.lights.size());
     std::vector<SceneLightSet> sets;
-    std::vector<uint32_t> set_of_lamp(scene.lights.size());
     PartNames names;
-    for (uint32_t s = 0; s < parts.size(); ++s) {
-        const SceneLightSet& whole = scene.light_sets[s];
-        const auto add = [&](std::string name) {
-            parts_of[s].push_back(static_cast<uint32_t>(sets.size()));
-            out.whole.push_back(groupOf(s));
-            sets.push_back({std::move(name), whole.max_weight, isApart(parts[s]) ? whole.name : ""});
-        };
-        if (!isApart(parts[s])) {
-            add(whole.name);
-            for (const uint32_t lamp : parts[s].lamps) set_of_lamp[lamp] = parts_of[s].front();
+    const auto add = [&](uint32_t group, SceneLightSet set) {
+        parts_of[group].push_back(static_cast<uint32_t>(sets.size()));
+        out.whole.push_back(group);
+        sets.push_back(std::move(set));
+    };
+    const auto addLamps = [&](uint32_t group, const std::string& whole, SceneLightSet set) {
+        for (const uint32_t lamp : parts[group].lamps) {
+            set_of_lamp[lamp] = static_cast<uint32_t>(sets.size());
+            set.name = names.of(whole, "lamp " + scene.lights[lamp].node);
+            add(group, set);
+        }
+    };
+    for (uint32_t g = 1; g < parts.size(); ++g) {
+        const SceneLightSet& whole = scene.light_sets[g - 1];
+        if (!isApart(parts[g])) {
+            add(g, whole);
             continue;
         }
-        if (parts[s].surfaces) add(names.of(whole.name, "surfaces"));
-        for (const uint32_t lamp : parts[s].lamps) {
-            add(names.of(whole.name, "lamp " + scene.lights[lamp].node));
-            set_of_lamp[lamp] = parts_of[s].back();
+        SceneLightSet part{.name = "", .max_weight = whole.max_weight, .part_of = whole.name};
+        if (parts[g].surfaces) {
+            part.name = names.of(whole.name, "surfaces");
+            add(g, part);
         }
+        addLamps(g, whole.name, part);
     }
+    if (isApart(parts[always_group])) addLamps(always_group, "always-on light", {.name = "", .always_on = true});
+
     for (uint32_t l = 0; l < scene.lights.size(); ++l)
-        if (std::optional<uint32_t>& set = scene.lights[l].light_set)
-            set = scene.lights[l].bake == BakeMode::None ? parts_of[*set].front() : set_of_lamp[l];
+        if (std::optional<uint32_t>& set = scene.lights[l].light_set; set_of_lamp[l])
+            set = set_of_lamp[l];
+        else if (set)
+            set = parts_of[groupOf(set)].front();
     for (SceneMesh& mesh : scene.meshes)
-        if (mesh.light_set) mesh.light_set = parts_of[*mesh.light_set].front();
+        if (mesh.light_set) mesh.light_set = parts_of[groupOf(mesh.light_set)].front();
     out.sets = std::exchange(scene.light_sets, std::move(sets));
     out.combinations = std::exchange(scene.combinations, {});
     for (const auto& combination : out.combinations) {
         const auto set = std::ranges::find(combination, false, &ElementRef::is_door);
-        if (set == combination.end()) scene.combinations.push_back(combination);
-        for (size_t p = 0; set != combination.end() && p < parts_of[set->index].size(); ++p) {
+        if (set == combination.end()) {
             scene.combinations.push_back(combination);
-            scene.combinations.back()[static_cast<size_t>(set - combination.begin())].index = parts_of[set->index][p];
+            continue;
+        }
+        for (const uint32_t part : parts_of[1 + set->index]) {
+            scene.combinations.push_back(combination);
+            scene.combinations.back()[static_cast<size_t>(set - combination.begin())].index = part;
         }
     }
     return out;
 }
 
 void putTogether(const LampGroups& parts, const SetScales& scales, Scene& scene, Baked& baked) {
-    if (parts.sets.empty()) return;
+    if (parts.none()) return;
     const WholeTerms terms = wholeTerms(parts, baked.terms);
     baked.light = together(baked.light, terms.of_part);
     baked.local_light = together(baked.local_light, terms.of_part);
@@ -182,7 +196,10 @@ void putTogether(const LampGroups& parts, const SetScales& scales, Scene& scene,
     baked.terms = terms.terms;
     baked.door_flux.clear();
     const auto restore = [&](std::optional<uint32_t>& set) {
-        if (set) set = parts.whole[groupOf(set)] - 1;
+        if (const uint32_t group = parts.whole[groupOf(set)]; group != always_group)
+            set = group - 1;
+        else
+            set.reset();
     };
     for (PunctualLight& light : scene.lights) restore(light.light_set);
     for (SceneMesh& mesh : scene.meshes) restore(mesh.light_set);

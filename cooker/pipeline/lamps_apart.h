@@ -1,5 +1,5 @@
-// Light sets taken apart for a bake, lamp by lamp, and put together afterwards: where a cache keeps what each lamp
-// does, one that is edited alone is baked alone, and made brighter is multiplied.
+// Light sets and always-on light taken apart for a bake, lamp by lamp, and put together afterwards: where a cache keeps
+// what each lamp does, one that is edited alone is baked alone, and made brighter is multiplied.
 #pragma once
 
 #include <pipeline/set_scales.h>
@@ -10,16 +10,17 @@
 namespace dimmer::cook {
 
 struct LampGroups {
-    std::vector<SceneLightSet> sets;                    // the level's own; empty: none was taken apart
+    std::vector<SceneLightSet> sets;                    // the level's own
     std::vector<std::vector<ElementRef>> combinations;  // likewise
     std::vector<uint32_t> whole;                        // per light group of the parts: the level's own
+    bool none() const { return whole.empty(); }         // was taken apart
 
     // What is said of the level's groups, said of the parts.
     std::vector<float> ofParts(const std::vector<float>& of_groups) const;
 };
 
 // Makes every lamp of a set a set of its own, and all emissive surfaces of the set one more; sets of more than
-// `lamps_max` of those stay whole.
+// `lamps_max` of those stay whole. Likewise lamps of no set, of which the sky and surfaces stay always-on light.
 LampGroups takeLampsApart(Scene& scene, uint32_t lamps_max);
 
 // The sets again: the light of their parts, in lux, added up, with the records of all; `baked.door_flux`, whose use is

@@ -23,20 +23,25 @@ glm::vec3 divided(glm::vec3 light, glm::vec3 scale) {
     return out;
 }
 
-// Emissive materials by the light set of the meshes that use them.
-std::map<std::pair<uint32_t, uint32_t>, uint32_t> emissiveInSets(const Scene& scene) {
+// Emissive materials by the light group of the meshes that use them.
+std::map<std::pair<uint32_t, uint32_t>, uint32_t> emissiveInGroups(const Scene& scene) {
     std::map<std::pair<uint32_t, uint32_t>, uint32_t> used;
     for (const SceneMesh& mesh : scene.meshes)
         for (const uint32_t m : mesh.triangle_materials)
-            if (mesh.light_set && scene.materials[m].emission_cd_m2 != glm::vec3(0)) used[{*mesh.light_set, m}] = m;
+            if (scene.materials[m].emission_cd_m2 != glm::vec3(0)) used[{groupOf(mesh.light_set), m}] = m;
     return used;
 }
 
-// Whether anything outside of the set is made of the material.
-bool isShared(const Scene& scene, uint32_t material, uint32_t set) {
+// Whether anything outside of the group is made of the material.
+bool isShared(const Scene& scene, uint32_t material, uint32_t group) {
     for (const SceneMesh& mesh : scene.meshes)
-        if (mesh.light_set != set && std::ranges::count(mesh.triangle_materials, material) > 0) return true;
+        if (groupOf(mesh.light_set) != group && std::ranges::count(mesh.triangle_materials, material) > 0) return true;
     return false;
+}
+
+void fillBlackChannels(glm::vec3& scale, glm::vec3 light) {
+    for (int c = 0; c < 3; ++c)
+        if (!(scale[c] > 0)) scale[c] = light[c];
 }
 
 }  // namespace
@@ -44,55 +49,53 @@ bool isShared(const Scene& scene, uint32_t material, uint32_t set) {
 SetScales divideByScales(Scene& scene) {
     SetScales scales;
     scales.of_group.assign(1 + scene.light_sets.size(), glm::vec3(0));
-    scales.of_group[always_group] = glm::vec3(1);
-    auto used = emissiveInSets(scene);
-    std::vector<uint8_t> has_lamps(scales.of_group.size());
+    std::vector<glm::vec3> surfaces(scales.of_group.size(), glm::vec3(0));
+    auto used = emissiveInGroups(scene);
     for (const PunctualLight& light : scene.lights) {
-        if (!light.light_set || light.bake == BakeMode::None) continue;
+        if (light.bake == BakeMode::None) continue;
         glm::vec3& scale = scales.of_group[groupOf(light.light_set)];
         scale = glm::max(scale, light.intensity);
-        has_lamps[groupOf(light.light_set)] = 1;
     }
     for (const auto& [key, material] : used)
-        if (glm::vec3& scale = scales.of_group[groupOf(key.first)]; !has_lamps[groupOf(key.first)])
-            scale = glm::max(scale, scene.materials[material].emission_cd_m2);
-    // A channel that only emissive surfaces have.
-    for (const auto& [key, material] : used)
-        for (int c = 0; c < 3; ++c)
-            if (float& scale = scales.of_group[groupOf(key.first)][c]; !(scale > 0))
-                scale = scene.materials[material].emission_cd_m2[c];
+        surfaces[key.first] = glm::max(surfaces[key.first], scene.materials[material].emission_cd_m2);
+    fillBlackChannels(scales.of_group[always_group], scene.sky_radiance_cd_m2);
+    for (size_t g = 0; g < surfaces.size(); ++g) fillBlackChannels(scales.of_group[g], surfaces[g]);
 
     for (PunctualLight& light : scene.lights)
-        if (light.light_set) light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);
+        light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);
+    scene.sky_radiance_cd_m2 = divided(scene.sky_radiance_cd_m2, scales.of_group[always_group]);
     for (const Material& m : scene.materials) {
         scales.copy_of.push_back(static_cast<uint32_t>(scales.copy_of.size()));
         scales.emission_cd_m2.push_back(m.emission_cd_m2);
     }
-    for (auto& [key, material] : used) {
-        if (isShared(scene, material, key.first)) {
-            scene.materials.push_back(scene.materials[material]);
-            scales.emission_cd_m2.push_back(scales.emission_cd_m2[material]);
-            scales.copy_of.push_back(material);
-            material = static_cast<uint32_t>(scene.materials.size() - 1);
+    // Sets have copies of what they share; always-on light keeps the level's own, and is divided when those are made.
+    for (const bool always : {false, true})
+        for (auto& [key, material] : used) {
+            if ((key.first == always_group) != always) continue;
+            if (!always && isShared(scene, material, key.first)) {
+                scene.materials.push_back(scene.materials[material]);
+                scales.emission_cd_m2.push_back(scales.emission_cd_m2[material]);
+                scales.copy_of.push_back(material);
+                material = static_cast<uint32_t>(scene.materials.size() - 1);
+            }
+            glm::vec3& emission = scene.materials[material].emission_cd_m2;
+            emission = divided(emission, scales.of_group[key.first]);
         }
-        glm::vec3& emission = scene.materials[material].emission_cd_m2;
-        emission = divided(emission, scales.of_group[groupOf(key.first)]);
-    }
     for (SceneMesh& mesh : scene.meshes)
         for (uint32_t& m : mesh.triangle_materials)
-            if (mesh.light_set)
-                if (const auto own = used.find({*mesh.light_set, m}); own != used.end()) m = own->second;
+            if (const auto own = used.find({groupOf(mesh.light_set), m}); own != used.end()) m = own->second;
     return scales;
 }
 
+Gathered multiplied(const Gathered& light, glm::vec3 scale) {
+    const glm::vec3 irradiance_lux = light.irradiance_lux * scale;
+    const float before = luminance(light.irradiance_lux);
+    return {irradiance_lux, light.tilted_lux * (before > 0 ? luminance(irradiance_lux) / before : 0.0f)};
+}
+
 void multiplyByScales(const SetScales& scales, Baked& baked) {
-    baked.light.forEach([&](ReceiverLight& l) {
-        const glm::vec3 scale = scales.of_group[baked.terms[l.term].group];
-        const float before = luminance(l.light.irradiance_lux);
-        l.light.irradiance_lux *= scale;
-        const float after = luminance(l.light.irradiance_lux);
-        l.light.tilted_lux *= before > 0 ? after / before : 0.0f;
-    });
+    baked.light.forEach(
+        [&](ReceiverLight& l) { l.light = multiplied(l.light, scales.of_group[baked.terms[l.term].group]); });
     for (auto* probes : {&baked.grid.light, &baked.local_light})
         probes->forEach([&](ProbeTermLight& l) {
             const glm::vec3 scale = scales.of_group[baked.terms[l.term].group];

@@ -140,6 +140,7 @@ struct SceneLightSet {
     float max_weight = 1;
     // The level's set that this is a lamp of (pipeline/lamps_apart.h); empty: it is the level's own.
     std::string part_of = {};
+    bool always_on = false;  // likewise, a lamp of no set: its light is stored however faint it is
 };
 
 struct SceneDoor {

@@ -114,9 +114,21 @@ TEST_F(CachedCook, AnyOtherEditOfASetMakesThatSet) {
     EXPECT_THAT(made(level), ElementsAre("pack", "light set 'both'"));
     lamp(level, 0)["intensity"] = 50;  // not the panel
     EXPECT_THAT(made(level), ElementsAre("pack", "light set 'one'"));
-    level.document["scenes"][0]["extras"]["dimmer_sky_luminance"] = 6;
+    level.addLight("sun", {{"type", "directional"}, {"intensity", 100}}, json::object());
     EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
     EXPECT_THAT(why(level, "pack"), IsEmpty());
+}
+
+TEST_F(CachedCook, ABrighterSkyIsMultiplied) {
+    LevelFile level = houseOfTwo();
+    json& extras = level.document["scenes"][0]["extras"];
+    made(level);
+    extras["dimmer_sky_luminance"] = 9.7;
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    level.addLight("sun", {{"type", "directional"}, {"intensity", 100}}, json::object());
+    EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
+    extras["dimmer_sky_luminance"] = 11;  // beside the sun's another mixture
+    EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
 }
 
 // Lamp by lamp: brightness of one is a multiplication, and what moves is baked alone.
@@ -152,6 +164,12 @@ TEST_F(CachedCook, OfLampsTakenApartTheEditedOneIsMade) {
     for (json& node : level.document["nodes"])
         if (node.value("name", "") == "lamp4") node["name"] = "renamed";
     EXPECT_THAT(lightMade(), ElementsAre("light set 'both, lamp renamed'"));
+    level.addLight("sun", {{"type", "directional"}, {"intensity", 100}}, json::object());
+    EXPECT_THAT(lightMade(), ElementsAre("always-on light, lamp sun"));  // the sky is as it was
+    lamp(level, 4)["intensity"] = 250;
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    level.document["scenes"][0]["extras"]["dimmer_sky_luminance"] = 8;
+    EXPECT_THAT(made(level), ElementsAre("pack"));
 }
 
 TEST_F(CachedCook, ASetMoreOrLessLeavesTheOthers) {

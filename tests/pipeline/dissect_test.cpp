@@ -82,6 +82,50 @@ TEST(Dissect, FinerFormatsAreMeasuredAsFiner) {
     }
 }
 
+// A panel on each side of a floor, one always on, one in a set. Bakes know both at the unit of their own brightness: a
+// set a hundred thousandth as bright leaves the errors of the other panel's light, one as bright gives those of the mixture.
+TEST(Dissect, FormatsAreMeasuredOnSetsAsBrightAsTheyAre) {
+    const auto errorBeside = [](double set_cd_m2) {
+        LevelFile level;
+        const json black = {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 0, 1}}, {"metallicFactor", 0}}},
+                            {"extensions", {{"KHR_materials_specular", {{"specularFactor", 0}}}}}};
+        level.addNode({{"name", "floor"}, {"mesh", level.addSquareMesh(level.addMaterial(black))}});
+        level.document["extensionsUsed"].push_back("KHR_materials_emissive_strength");
+        const auto addPanel = [&](double x, double cd_m2) -> json& {
+            json glow = black;
+            glow["emissiveFactor"] = {1, 1, 1};
+            glow["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] = cd_m2;
+            return level.node(level.addNode({{"name", "panel"},
+                                             {"mesh", level.addSquareMesh(level.addMaterial(glow))},
+                                             {"translation", {x, 0, 1}},
+                                             {"rotation", {0, 1, 0, 0}},
+                                             {"scale", {0.2, 0.2, 0.2}}}));
+        };
+        addPanel(-1, 400);
+        addPanel(1, set_cd_m2)["extras"]["dimmer_light_set"] = "right";
+        const auto scene = level.import();
+        EXPECT_TRUE(scene) << scene.error().message;
+        SilentProgress silent;
+        CookStats stats;
+        auto data = cookScene(*scene, fineProfile(), "draft", silent, stats);
+        EXPECT_TRUE(data) << data.error().message;
+        const VerifyOptions options{.state = "", .points = 60, .paths_max = 64, .sets = false, .formats = true};
+        const auto report = verify(*scene, *Pack::fromData(std::move(*data)), options, silent);
+        EXPECT_TRUE(report) << report.error().message;
+        for (const FormatError& f : report->formats)
+            if (f.color_format == ColorFormat::E5B9G9R9 && f.direction_model == DirectionModel::Linear && f.sets == 1)
+                return f.mean;
+        ADD_FAILURE();
+        return 0.0;
+    };
+    // A hundred thousandth of the light is below the thousandth by which errors know light (their floor, a hundredth of
+    // the mean, at a tenth).
+    const double beside_faint = errorBeside(0.004), beside_fainter = errorBeside(0.0004);
+    const double beside_bright = errorBeside(400);
+    EXPECT_NEAR(beside_faint, beside_fainter, 0.03 * beside_faint);
+    EXPECT_GT(std::abs(beside_bright - beside_faint), 0.1 * beside_faint);
+}
+
 struct CountedStages final : Progress {
     int count = 0;
     void stage(std::string_view, uint64_t) override { ++count; }

@@ -81,7 +81,7 @@ TEST(LampsApart, EveryLampIsAGroupAndAllSurfacesAreOne) {
     }
     // One lamp too many.
     Scene untouched = whole;
-    EXPECT_TRUE(takeLampsApart(untouched, 2).sets.empty());
+    EXPECT_TRUE(takeLampsApart(untouched, 2).none());
     EXPECT_THAT(names(untouched), ElementsAre("mixed", "lone"));
 }
 
@@ -201,6 +201,83 @@ TEST(LampsApart, GiveTheLightOfTheSet) {
                 EXPECT_NEAR(after[i][c], before[i][c], brightest / 256) << state << ", point " << i << ", " << c;
             }
         EXPECT_GT(lit / static_cast<double>(points.size()), 10) << state;
+    }
+}
+
+// Outdoors and in: an open room under a sky, with a sun, a lamp in a corner and, if asked for, a set; a door's leaf
+// stands in the middle.
+LevelFile daylit(const json& walls, bool with_set) {
+    LevelFile level;
+    const int paint = level.addMaterial(walls);
+    level.addNode({{"name", "ground"},
+                   {"mesh", level.addSquareMesh(paint)},
+                   {"translation", {1, 0, -1}},
+                   {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}},
+                   {"scale", {2, 2, 2}}});
+    level.addNode({{"name", "leaf"},
+                   {"mesh", addRoomMesh(level, {0.8f, 0.2f, -1.2f}, 0.4f, paint)},
+                   {"extras", {{"dimmer_door", "hatch"}}}});
+    const json full = {{"dimmer_bake", "full"}};
+    const int sun = level.addLight("sun", {{"type", "directional"}, {"intensity", 40}, {"color", {1, 0.9, 0.7}}}, full);
+    level.node(sun)["rotation"] = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
+    const int lamp = level.addLight("corner", {{"type", "point"}, {"intensity", 3}}, full);
+    level.node(lamp)["translation"] = {0.3, 0.5, -0.3};
+    if (with_set) {
+        const int of_set = level.addLight("bulb", {{"type", "point"}, {"intensity", 20}},
+                                          {{"dimmer_light_set", "bulbs"}, {"dimmer_bake", "full"}});
+        level.node(of_set)["translation"] = {1.7, 0.5, -1.7};
+    }
+    level.document["scenes"][0]["extras"] = {{"dimmer_sky_color", {0.8, 0.9, 1}}, {"dimmer_sky_luminance", 5}};
+    return level;
+}
+
+TEST(LampsApart, LampsOfNoSetAreApartFromTheSky) {
+    auto scene = daylit(white(), true).import();
+    ASSERT_TRUE(scene) << scene.error().message;
+    const Scene level = *scene;
+    const LampGroups parts = takeLampsApart(*scene, 3);
+    EXPECT_THAT(names(*scene), ElementsAre("bulbs", "always-on light, lamp sun", "always-on light, lamp corner"));
+    EXPECT_THAT(parts.whole, ElementsAre(0, 1, 0, 0));
+    EXPECT_THAT(scene->light_sets, ElementsAre(testing::Field(&SceneLightSet::always_on, false),
+                                               testing::Field(&SceneLightSet::always_on, true),
+                                               testing::Field(&SceneLightSet::always_on, true)));
+    Baked nothing;
+    for (uint32_t g = 0; g < 4; ++g) nothing.terms.push_back({g, {}, {}});
+    nothing.reports.resize(4);
+    putTogether(parts, {std::vector(4, glm::vec3(1)), {}, {}}, *scene, nothing);
+    EXPECT_EQ(nothing.terms.size(), 2u);
+    EXPECT_EQ(names(*scene), names(level));
+    for (size_t l = 0; l < level.lights.size(); ++l) EXPECT_EQ(scene->lights[l].light_set, level.lights[l].light_set);
+    // Sky and two lamps are three.
+    Scene untouched = level;
+    EXPECT_TRUE(takeLampsApart(untouched, 2).none());
+}
+
+// The ground of 64 texels per square metre, the leaf over it closed and open; with sets beside and without any. What
+// lamps do is exact, to a step of the format (a 256th) and the filter for noise, which looks at the sum of both or at the
+// sky's light alone; the sky's light has some 3 % of noise at a texel of 128 rays, in the mean of the points 0.3.
+TEST(LampsApart, GiveTheLightThatIsAlwaysOn) {
+    for (const bool with_set : {true, false}) {
+        const LevelFile level = daylit(white(), with_set);
+        const auto whole = cookApart(level, 0), apart = cookApart(level, 8);
+        ASSERT_TRUE(whole && apart) << apart.error().message;
+        EXPECT_EQ(whole->contributions.size(), apart->contributions.size());
+        const Pack a = *Pack::fromData(PackData(*whole)), b = *Pack::fromData(PackData(*apart));
+        std::vector<QueryPoint> points;
+        for (int x = 1; x < 16; ++x)
+            for (int z = 1; z < 16; ++z)
+                points.push_back({{0.125f * static_cast<float>(x), 0, -0.125f * static_cast<float>(z)}, {0, 1, 0}});
+        for (const std::string state : {"", "door:hatch=1"}) {
+            glm::dvec3 before(0), after(0);
+            const auto at_whole = sampled(a, points, state), at_parts = sampled(b, points, state);
+            for (size_t i = 0; i < points.size(); ++i) {
+                before += at_whole[i];
+                after += at_parts[i];
+                EXPECT_NEAR(at_parts[i].y, at_whole[i].y, 0.15 * at_whole[i].y) << state << ", point " << i;
+            }
+            EXPECT_GT(before.y / static_cast<double>(points.size()), 20) << state;
+            for (int c = 0; c < 3; ++c) EXPECT_NEAR(after[c] / before[c], 1, 0.01) << state << ", " << c;
+        }
     }
 }
 
