@@ -37,7 +37,7 @@ constexpr size_t links_ahead = 8;
 class Expansion {
    public:
     Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-              std::span<const uint8_t> groups, RayEnds* ends)
+              std::span<const uint8_t> groups, RayEnds* ends, std::string_view what_for = "")
         : gatherer_(gatherer),
           receivers_(gatherer.receiverCount()),
           settings_(settings),
@@ -46,6 +46,7 @@ class Expansion {
           paths_(gatherer.paths()),
           terms_(paths_.termCount()),
           ends_(ends),
+          what_for_(what_for),
           activity_(gatherer, settings, doors_seen_),
           running_(groups.begin(), groups.end()) {
         if (running_.empty()) running_.assign(paths_.groupCount(), 1);
@@ -84,7 +85,7 @@ class Expansion {
     // and sky leave behind which receivers see one another: the links that the series follows.
     // `light_points`: each lamp is asked for from so many of a receiver's points at most.
     void directPass(uint32_t light_points) {
-        progress_.stage("direct light and links", receivers_);
+        progress_.stage("direct light and links" + what_for_, receivers_);
         links_ = Links(receivers_, settings_.series_rays);
         const bool remembers = ends_ && ends_->rows() == 0;
         if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_), gatherer_.paths().pathCount());
@@ -139,6 +140,12 @@ class Expansion {
                 left_to_renderer.put(i, left_row);
                 stored.put(i, stored_row);
             }
+            // At once, or what blocks reserve while they are filled would add up.
+            door_links.close(begin);
+            doors_seen.close(begin);
+            direct.close(begin);
+            left_to_renderer.close(begin);
+            stored.close(begin);
             if (remembers) ends_->putBlock(begin / rows_per_block, all_ends);
             rays_traced_ += traced;
             progress_.advance(end - begin);
@@ -307,7 +314,7 @@ class Expansion {
     // evenly, the light leaps to where they lead; the rounds after that mend what the leap got wrong from place to
     // place. Each group ends when what is still to come of its own light is little.
     void bounce() {
-        progress_.stage("bounces", settings_.bounces_max);
+        progress_.stage("bounces" + what_for_, settings_.bounces_max);
         out_.bounced = SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
             for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
         });
@@ -358,6 +365,7 @@ class Expansion {
     const DoorPaths& paths_;
     uint32_t terms_;
     RayEnds* ends_;  // may be null
+    std::string what_for_;
     Activity activity_;
     std::vector<uint8_t> running_;             // per light group: its light is still followed
     std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
@@ -378,7 +386,7 @@ Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Prog
 
 std::vector<double> termFlux(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
                              std::span<const uint8_t> groups, RayEnds* links) {
-    return Expansion(gatherer, settings, progress, groups, links).flux();
+    return Expansion(gatherer, settings, progress, groups, links, " for pairs of doors").flux();
 }
 
 }  // namespace dimmer::cook

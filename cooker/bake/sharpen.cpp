@@ -30,13 +30,15 @@ void move(ReceiverLight& texel, const Step& step) {
 }
 
 // Receivers that lie so many blocks before one that they are shown beside: over a seam, padding shows any place.
-constexpr uint32_t near_blocks = 256;
-bool isFarBehind(size_t receiver, size_t reader) {
-    return reader / rows_per_block > receiver / rows_per_block + near_blocks;
-}
+struct FarBehind {
+    uint32_t near_blocks;
+    bool operator()(size_t receiver, size_t reader) const {
+        return reader / rows_per_block > receiver / rows_per_block + near_blocks;
+    }
+};
 
 // The rows of those.
-Sparse<ReceiverLight> farBehind(const BilinearTaps& taps, const Sparse<ReceiverLight>& light) {
+Sparse<ReceiverLight> farBehind(const BilinearTaps& taps, const Sparse<ReceiverLight>& light, FarBehind isFarBehind) {
     std::vector<std::atomic<bool>> far(light.rows());
     forEachBlock(light.rows(), [&](size_t begin, size_t end) {
         std::vector<Tap> around;
@@ -53,9 +55,11 @@ Sparse<ReceiverLight> farBehind(const BilinearTaps& taps, const Sparse<ReceiverL
 
 }  // namespace
 
-Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, Sparse<ReceiverLight> light, Progress& progress) {
+Sparse<ReceiverLight> sharpen(const BilinearTaps& taps, Sparse<ReceiverLight> light, Progress& progress,
+                              uint32_t near_blocks) {
     progress.stage("sharpen", light.rows());
-    const Sparse<ReceiverLight> far = farBehind(taps, light);
+    const FarBehind isFarBehind{near_blocks};
+    const Sparse<ReceiverLight> far = farBehind(taps, light, isFarBehind);
     std::vector<uint32_t> last_reader(blockCount(light.rows()), near_blocks);
     for (size_t b = 0; b < last_reader.size(); ++b) last_reader[b] += static_cast<uint32_t>(b);
     const auto rowOf = [&](size_t receiver, size_t reader) {

@@ -185,5 +185,44 @@ TEST(Sharpen, NoTexelGoesDarkBesideABrightOne) {
     EXPECT_EQ(lone[bright], 1000);
 }
 
+// A floor of 500,000 texels (and its back) in two meshes, 2,000 blocks of rows: over the seam between them texels of
+// one show those of the other, which are replaced long before. In place they become what they become when nothing is
+// replaced before the end.
+TEST(Sharpen, InPlaceWhatIsReadOverASeamIsAsItWas) {
+    Scene scene;
+    const uint32_t paint = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "first", {0, 0, 0}, {0, 0, 64}, {64, 0, 0}, paint);
+    addQuad(scene, "second", {0, 0, 64}, {0, 0, 64}, {64, 0, 0}, paint);
+    const BakedScene b(scene, 4, 2);
+    ASSERT_GT(b.texels.size(), size_t{2} * 256 * rows_per_block - 1);
+    const BilinearTaps taps(*b.rays, b.charts, b.texels);
+    size_t far = 0;
+    std::vector<Tap> around;
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        taps.around(static_cast<uint32_t>(i), around);
+        for (const Tap& tap : around) far += i / rows_per_block > tap.receiver / rows_per_block + 256;
+    }
+    ASSERT_GT(far, 100u);
+    const auto after = [&](uint32_t near_blocks) {
+        const auto fill = [&](size_t begin, size_t end, auto emit) {
+            for (size_t i = begin; i < end; ++i) {
+                const ReceiverLight l = lightOf(1 + unitFloat(hash(7, static_cast<uint32_t>(i))), 0.1f);
+                emit(std::span<const ReceiverLight>(&l, 1));
+            }
+        };
+        SilentProgress quiet;
+        return sharpen(taps, Sparse<ReceiverLight>::build(b.texels.size(), fill), quiet, near_blocks);
+    };
+    const auto at_once = after(1u << 20), in_place = after(256), least = after(0);
+    size_t moved = 0;
+    for (size_t i = 0; i < b.texels.size(); ++i) {
+        const float lux = at_once.row(i)[0].light.irradiance_lux.x;
+        moved += lux != 1 + unitFloat(hash(7, static_cast<uint32_t>(i)));
+        ASSERT_EQ(in_place.row(i)[0].light.irradiance_lux.x, lux) << i;
+        ASSERT_EQ(least.row(i)[0].light.irradiance_lux.x, lux) << i;
+    }
+    EXPECT_GT(moved, b.texels.size() / 2);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test
