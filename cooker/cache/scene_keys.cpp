@@ -184,7 +184,7 @@ Key lampsKey(const Scene& scene, uint32_t group) {
     if (group == always_group)
         addSky(key, scene);
     else
-        key.add(scene.light_sets[group - 1].name);
+        key.add(scene.light_sets[group - 1].name).add(uint32_t{scene.light_sets[group - 1].always_on});
     for (const PunctualLight& light : scene.lights)
         if (groupOf(light.light_set) == group && light.bake != BakeMode::None) addLamp(key, light);
     key.add(std::string_view("emitters"));

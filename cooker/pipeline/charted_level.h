@@ -13,7 +13,7 @@
 namespace dimmer::cook {
 
 struct ChartedLevel {
-    // As imported: divides the light of sets by its scale and prepares the scene (prepareScene). The rest waits for
+    // As imported: divides light by its groups' scales and prepares the scene (prepareScene). The rest waits for
     // chart().
     ChartedLevel(Scene level, const Profile& profile);
     ChartedLevel(const ChartedLevel&) = delete;  // `rays` refers to `scene`

@@ -29,7 +29,7 @@ struct Quality {
     float noise = 0;                 // rays end when the 95 % interval is within this share of the light; 0: never
     uint32_t denoise = 0;            // 1: filter the noise that is left
     uint32_t sharpen = 1;            // 1: texels as bilinear filtering needs them; 0: their means
-    uint32_t lamps_apart = 0;        // sets of at most so many lamps are baked lamp by lamp; see lamps_apart.h
+    uint32_t lamps_apart = 0;        // groups of at most so many lamps are baked lamp by lamp; see lamps_apart.h
     uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when less of places' light is still to come, in the mean

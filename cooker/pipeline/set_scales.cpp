@@ -2,6 +2,7 @@
 
 #include <bake/sampling.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -58,8 +59,11 @@ SetScales divideByScales(Scene& scene) {
     }
     for (const auto& [key, material] : used)
         surfaces[key.first] = glm::max(surfaces[key.first], scene.materials[material].emission_cd_m2);
-    fillBlackChannels(scales.of_group[always_group], scene.sky_radiance_cd_m2);
-    for (size_t g = 0; g < surfaces.size(); ++g) fillBlackChannels(scales.of_group[g], surfaces[g]);
+    for (size_t g = 1; g < surfaces.size(); ++g) fillBlackChannels(scales.of_group[g], surfaces[g]);
+    // One number for all channels: no game recolours it, and so directions are weighted by its true colours.
+    glm::vec3& of_always = scales.of_group[always_group];
+    of_always = glm::max(of_always, glm::max(scene.sky_radiance_cd_m2, surfaces[always_group]));
+    of_always = glm::vec3(std::max({of_always.x, of_always.y, of_always.z}));
 
     for (PunctualLight& light : scene.lights)
         light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);

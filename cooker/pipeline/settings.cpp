@@ -155,9 +155,9 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
                     "which filtering blurs again"});
     list.push_back(
         {prefix + "lamps_apart", &q.lamps_apart, 0, 1024,
-         "light sets of at most so many lamps (all emissive surfaces of a set are one) are baked lamp by lamp, and "
-         "so are lamps of no set beside the sky: an edit of one lamp bakes that lamp alone, and one of its "
-         "brightness nothing; 0: set by set, in a shorter first cook"});
+         "light sets of at most so many lamps (all emissive surfaces of a set are one), and always-on light of as "
+         "few (surfaces and sky are one), are baked lamp by lamp: an edit of one lamp bakes that lamp alone, and one "
+         "of its brightness nothing; 0: set by set, in a shorter first cook"});
     list.push_back({prefix + "probe_sites", &q.probe_sites, 1, 256,
                     "places per probe of the global grid at which light is traced, to choose and fit probes by"});
     list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});

@@ -160,7 +160,7 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
     BakedGrid out;
     out.free_volume_m3 = choice.free_volume_m3;
     if (choice.blocks.empty()) return out;
-    const std::vector<FitValue> states = statesOf(light, terms, siteOrder(choice.blocks));
+    const std::vector<FitValue> states = statesOf(rays.scene(), light, terms, siteOrder(choice.blocks));
     auto placed = placeProbes(rays, choice, states, settings, progress);
     if (!placed) return std::unexpected(placed.error());
     progress.stage("probes", terms.size());

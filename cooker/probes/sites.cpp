@@ -306,15 +306,15 @@ GroupSums sumsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term
     return sums;
 }
 
-std::vector<float> weightsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
+std::vector<float> weightsOfGroups(const Scene& scene, const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
                                    std::span<const SiteRow> order) {
-    const uint32_t groups = 1 + std::ranges::max(terms, {}, &Term::group).group;
+    const uint32_t groups = 1 + static_cast<uint32_t>(scene.light_sets.size());
     GroupSums sums = sumsOfGroups(light, terms, groups, [&](size_t i) { return order[i].block == 0; });
     if (std::ranges::max(sums.lux) == 0) sums = sumsOfGroups(light, terms, groups, [](size_t) { return true; });
     std::vector<float> weights(groups);
     for (uint32_t g = 0; g < groups; ++g)
         if (sums.lux[g] > 0)
-            weights[g] = static_cast<float>(sums.rows[g] / sums.lux[g]) * (g == always_group ? 1 : weight_of_sets);
+            weights[g] = static_cast<float>(sums.rows[g] / sums.lux[g]) * (isAlwaysOn(scene, g) ? 1 : weight_of_sets);
     return weights;
 }
 
@@ -465,15 +465,16 @@ Sparse<ProbeTermLight> SiteLight::take() {
     return all;
 }
 
-std::vector<FitValue> statesOf(const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
+std::vector<FitValue> statesOf(const Scene& scene, const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
                                std::span<const SiteRow> order) {
-    const std::vector<float> weights = weightsOfGroups(light, terms, order);
+    const std::vector<float> weights = weightsOfGroups(scene, light, terms, order);
     std::vector<FitValue> states(light.rows(), FitValue{});
     tbb::parallel_for(size_t{0}, light.rows(), [&](size_t i) {
         for (const ProbeTermLight& l : light.row(i)) {
             const Term& term = terms[l.term];
             if (!term.doors_open.empty()) continue;
-            for (const size_t state : {size_t{0}, size_t{1 + term.group % 2}})
+            const size_t half = isAlwaysOn(scene, term.group) ? 0 : term.group % 2;
+            for (const size_t state : {size_t{0}, 1 + half})
                 for (size_t k = 0; k < 9; ++k)
                     states[i][9 * state + k] += weights[term.group] * luminance(l.light.radiance[k]);
         }

@@ -1,4 +1,5 @@
 // Cooks with a cache: the same bytes as without, and only what changed is made again.
+#include <cache/scene_keys.h>
 #include <gmock/gmock.h>
 #include <pipeline/small_level.h>
 
@@ -125,6 +126,8 @@ TEST_F(CachedCook, ABrighterSkyIsMultiplied) {
     made(level);
     extras["dimmer_sky_luminance"] = 9.7;
     EXPECT_THAT(made(level), ElementsAre("pack"));
+    extras["dimmer_sky_color"] = {0.6, 0.8, 1};
+    EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
     level.addLight("sun", {{"type", "directional"}, {"intensity", 100}}, json::object());
     EXPECT_THAT(made(level), ElementsAre("pack", "always-on light"));
     extras["dimmer_sky_luminance"] = 11;  // beside the sun's another mixture
@@ -170,6 +173,16 @@ TEST_F(CachedCook, OfLampsTakenApartTheEditedOneIsMade) {
     EXPECT_THAT(made(level), ElementsAre("pack"));
     level.document["scenes"][0]["extras"]["dimmer_sky_luminance"] = 8;
     EXPECT_THAT(made(level), ElementsAre("pack"));
+}
+
+// A set may have the name that always-on lamps have when they are taken apart: its light has a threshold, theirs none.
+TEST(SceneKeys, ALampThatIsAlwaysOnIsNoSetOfThatName) {
+    Scene scene;
+    scene.lights.emplace_back().light_set = 0;
+    scene.light_sets.push_back({.name = "always-on light, lamp sun"});
+    const Key of_set = lampsKey(scene, 1);
+    scene.light_sets[0].always_on = true;
+    EXPECT_NE(lampsKey(scene, 1), of_set);
 }
 
 TEST_F(CachedCook, ASetMoreOrLessLeavesTheOthers) {

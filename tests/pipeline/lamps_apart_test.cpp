@@ -253,9 +253,9 @@ TEST(LampsApart, LampsOfNoSetAreApartFromTheSky) {
     EXPECT_TRUE(takeLampsApart(untouched, 2).none());
 }
 
-// The ground of 64 texels per square metre, the leaf over it closed and open; with sets beside and without any. What
-// lamps do is exact, to a step of the format (a 256th) and the filter for noise, which looks at the sum of both or at the
-// sky's light alone; the sky's light has some 3 % of noise at a texel of 128 rays, in the mean of the points 0.3.
+// The ground of 16 texels per square metre, the leaf over it closed and open; with sets beside and without any. What
+// lamps do is exact, to a step of the format (a 256th) and the filter for noise, which looks at the sum of both or at
+// the sky's light alone; the sky's light has some 5 % of noise at a texel of 32 rays, in the mean of the points 0.4.
 TEST(LampsApart, GiveTheLightThatIsAlwaysOn) {
     for (const bool with_set : {true, false}) {
         const LevelFile level = daylit(white(), with_set);
