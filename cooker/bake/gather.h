@@ -6,6 +6,7 @@
 #include <bake/door_guides.h>
 #include <bake/emitters.h>
 #include <bake/light_grid.h>
+#include <bake/links.h>
 #include <bake/ray_ends.h>
 #include <bake/sampling.h>
 #include <bake/sky.h>
@@ -148,13 +149,9 @@ struct GatherFrom {
 
 // What the rays of a gather found, for going there again.
 struct GatherLinks {
-    struct ThroughDoors {
-        uint32_t receiver;
-        uint32_t path;
-    };
-    std::span<uint32_t> hits;                 // per ray: the receiver that it hit over the free path, or no_index
-    std::vector<ThroughDoors> through_doors;  // over all other paths
-    std::vector<uint32_t> doors;              // that rays met, once for each ray
+    std::span<uint32_t> hits;         // per ray: the receiver that it hit over the free path, or no_index
+    std::vector<Link> through_doors;  // over all other paths
+    std::vector<uint32_t> doors;      // that rays met, once for each ray
 };
 
 // Rays per aim of a gather: an eighth of a round's.

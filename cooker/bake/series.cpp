@@ -86,7 +86,6 @@ class Expansion {
     // `light_points`: each lamp is asked for from so many of a receiver's points at most.
     void directPass(uint32_t light_points) {
         progress_.stage("direct light and links" + what_for_, receivers_);
-        links_ = Links(receivers_, settings_.series_rays);
         const bool remembers = ends_ && ends_->rows() == 0;
         if (remembers) *ends_ = RayEnds(receivers_, static_cast<uint32_t>(receivers_), gatherer_.paths().pathCount());
         const RayEnds* known = remembers ? nullptr : ends_;
@@ -98,7 +97,7 @@ class Expansion {
         options.wanted_in_group = followed_in_group_;
         SparseLight::Builder direct(receivers_), left_to_renderer(receivers_);
         Sparse<ReceiverLight>::Builder stored(receivers_);
-        Sparse<GatherLinks::ThroughDoors>::Builder door_links(receivers_);
+        Links::Builder all_links(receivers_);
         Sparse<uint32_t>::Builder doors_seen(receivers_);
         forEachBlock(receivers_, [&](size_t begin, size_t end) {
             TermAccumulator<Gathered> sum(terms_), full(terms_);
@@ -107,6 +106,7 @@ class Expansion {
             std::vector<ReceiverLight> stored_row;
             std::vector<uint32_t> hits(settings_.series_rays);
             GatherLinks links;
+            std::vector<Link> followed;
             RowEnds ends;
             std::vector<RowEnds> all_ends;
             GatherOptions own_options = options;
@@ -129,11 +129,13 @@ class Expansion {
                 std::ranges::fill(hits, no_index);
                 links = {hits, {}, {}};
                 gatherer_.gather(gatherer_.at(i), own_options, nullptr, sum, &links);
-                links_.put(i, hits);
+                followed = links.through_doors;
+                for (const uint32_t hit : hits)
+                    if (hit != no_index) followed.push_back({hit, free_path});
+                all_links.put(i, followed);
                 if (remembers) all_ends.push_back(ends);
                 std::ranges::sort(links.doors);
                 links.doors.erase(std::unique(links.doors.begin(), links.doors.end()), links.doors.end());
-                door_links.put(i, links.through_doors);
                 doors_seen.put(i, links.doors);
                 takeRow(sum, rounding, row);
                 direct.put(i, row);
@@ -141,7 +143,7 @@ class Expansion {
                 stored.put(i, stored_row);
             }
             // At once, or what blocks reserve while they are filled would add up.
-            door_links.close(begin);
+            all_links.close(begin);
             doors_seen.close(begin);
             direct.close(begin);
             left_to_renderer.close(begin);
@@ -150,7 +152,7 @@ class Expansion {
             rays_traced_ += traced;
             progress_.advance(end - begin);
         });
-        door_links_ = door_links.finish();
+        links_ = all_links.finish();
         doors_seen_ = doors_seen.finish();
         out_.direct = direct.finish();
         out_.left_to_renderer = left_to_renderer.finish();
@@ -193,21 +195,19 @@ class Expansion {
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
-            std::vector<uint32_t> hits(settings_.series_rays);
+            std::vector<Link> links;
             for (size_t i = begin; i < end; ++i) {
                 const uint32_t own = gatherer_.conditionOf(i);
-                links_.get(i, hits);
-                for (size_t k = 0; k < hits.size(); ++k) {
-                    if (k + links_ahead < hits.size() && hits[k + links_ahead] != no_index)
-                        radiance.prefetch(hits[k + links_ahead]);
-                    if (hits[k] == no_index) continue;
-                    if (own == no_condition)
-                        for (const TermLight& l : radiance.row(hits[k])) sum[l.term] += l;
+                links_.get(i, links);
+                for (size_t k = 0; k < links.size(); ++k) {
+                    if (k + links_ahead < links.size()) radiance.prefetch(links[k + links_ahead].receiver);
+                    const auto there = radiance.row(links[k].receiver);
+                    const uint32_t path = links[k].path;
+                    if (path == free_path && own == no_condition)
+                        for (const TermLight& l : there) sum[l.term] += l;
                     else
-                        addMoved(radiance.row(hits[k]), free_path, own, 1, sum);
+                        addMoved(there, path, own, path == free_path ? 1 : share_through_doors, sum);
                 }
-                for (const GatherLinks::ThroughDoors& link : door_links_.row(i))
-                    addMoved(radiance.row(link.receiver), link.path, own, share_through_doors, sum);
                 row.clear();
                 const Rounding rounding(i, Rounding::Of::Bounced);
                 for (const uint32_t t : sum.touched())
@@ -343,7 +343,6 @@ class Expansion {
             if (any_leaps) out_.bounced = leap(before, groups);
         }
         links_ = {};
-        door_links_ = {};
     }
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every
@@ -369,8 +368,7 @@ class Expansion {
     Activity activity_;
     std::vector<uint8_t> running_;             // per light group: its light is still followed
     std::vector<uint32_t> followed_in_group_;  // terms per light group, 0 for groups that are not asked for
-    Links links_;                              // series_rays of each receiver
-    Sparse<GatherLinks::ThroughDoors> door_links_;
+    Links links_;                              // of series_rays of each receiver, and of rays for doors alone
     Sparse<uint32_t> doors_seen_;
     std::vector<float> least_;  // lux per term, empty before the first bounce
     std::atomic<uint64_t> rays_traced_ = 0;
