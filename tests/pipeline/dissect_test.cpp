@@ -83,7 +83,8 @@ TEST(Dissect, FinerFormatsAreMeasuredAsFiner) {
 }
 
 // A panel on each side of a floor, one always on, one in a set. Bakes know both at the unit of their own brightness: a
-// set a hundred thousandth as bright leaves the errors of the other panel's light, one as bright gives those of the mixture.
+// set a hundred thousandth as bright leaves the errors of the other panel's light, one as bright gives those of the
+// mixture.
 TEST(Dissect, FormatsAreMeasuredOnSetsAsBrightAsTheyAre) {
     const auto errorBeside = [](double set_cd_m2) {
         LevelFile level;
