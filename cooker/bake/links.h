@@ -14,7 +14,7 @@ struct Link {
     auto operator<=>(const Link&) const = default;
 };
 
-// The links of every receiver, of which a bake at final has some 180: by path, in order of the receivers that they lead
+// The links of every receiver, at final some 180 of each: by path, in order of the receivers that they lead
 // to, as differences in Rice codes (Golomb 1966; Rice and Plaunt 1971). Some 15 bits a link, where the number of one of
 // a million receivers takes 20 and that of a path as many again. Thread-safe to read.
 class Links {

@@ -40,21 +40,29 @@ bool isShared(const Scene& scene, uint32_t material, uint32_t group) {
     return false;
 }
 
+void fillBlackChannels(glm::vec3& scale, glm::vec3 light) {
+    for (int c = 0; c < 3; ++c)
+        if (!(scale[c] > 0)) scale[c] = light[c];
+}
+
 }  // namespace
 
 SetScales divideByScales(Scene& scene) {
     SetScales scales;
     scales.of_group.assign(1 + scene.light_sets.size(), glm::vec3(0));
+    std::vector<glm::vec3> surfaces(scales.of_group.size(), glm::vec3(0));
     auto used = emissiveInGroups(scene);
-    const auto grow = [&](uint32_t group, glm::vec3 light) {
-        scales.of_group[group] = glm::max(scales.of_group[group], light);
-    };
-    for (const PunctualLight& light : scene.lights)
-        if (light.bake != BakeMode::None) grow(groupOf(light.light_set), light.intensity);
-    for (const auto& [key, material] : used) grow(key.first, scene.materials[material].emission_cd_m2);
-    grow(always_group, scene.sky_radiance_cd_m2);
+    for (const PunctualLight& light : scene.lights) {
+        if (light.bake == BakeMode::None) continue;
+        glm::vec3& scale = scales.of_group[groupOf(light.light_set)];
+        scale = glm::max(scale, light.intensity);
+    }
+    for (const auto& [key, material] : used)
+        surfaces[key.first] = glm::max(surfaces[key.first], scene.materials[material].emission_cd_m2);
+    for (size_t g = 1; g < surfaces.size(); ++g) fillBlackChannels(scales.of_group[g], surfaces[g]);
     // One number for all channels: no game recolours it, and so directions are weighted by its true colours.
     glm::vec3& of_always = scales.of_group[always_group];
+    of_always = glm::max(of_always, glm::max(scene.sky_radiance_cd_m2, surfaces[always_group]));
     of_always = glm::vec3(std::max({of_always.x, of_always.y, of_always.z}));
 
     for (PunctualLight& light : scene.lights)

@@ -16,8 +16,9 @@ struct SetScales {
     std::vector<uint32_t> copy_of;          // per material of the scene, the level's own that it is or is a copy of
 };
 
-// Divides the lamps, sky and emissive surfaces of every light group by the group's scale: per channel the largest
-// number of any of these (candela, lux or cd/m2), of always-on light the largest of all channels.
+// Divides the lamps, sky and emissive surfaces of every light group by the group's scale: of a set, per channel, the
+// largest punctual intensity (candela or lux) or else the largest radiance (cd/m2); of always-on light the largest of
+// all these numbers.
 // What is left is rounded to 16 bits of mantissa, an error below 1e-5, so that a level which wrote all of a group's
 // lamps 1.3 times as bright gives the same numbers. Materials that sets share are copied.
 SetScales divideByScales(Scene& scene);
