@@ -1,5 +1,6 @@
 #include <probes/grid_bake.h>
 
+#include <probes/face_order.h>
 #include <probes/placement.h>
 #include <probes/tetrahedra.h>
 
@@ -177,10 +178,11 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
             progress.advance(1);
         });
     }
-    out.light = Sparse<ProbeTermLight>::build(placed->place_of.size(), [&](size_t begin, size_t end, auto emit) {
-        for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[i]));
-    });
     out.grid = std::move(placed->grid);
+    const std::vector<uint32_t> placed_as = orderByFaces(out.grid);
+    out.light = Sparse<ProbeTermLight>::build(placed_as.size(), [&](size_t begin, size_t end, auto emit) {
+        for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[placed_as[i]]));
+    });
     return out;
 }
 

@@ -60,7 +60,8 @@ class Writer {
 
     // Neighbours in these are alike, byte by byte; of all others zstd makes less of the differences.
     static bool storesDifferences(ChunkType type) {
-        return type == ChunkType::BasePages || type == ChunkType::Payload || type == ChunkType::Addresses;
+        return type == ChunkType::BasePages || type == ChunkType::Payload || type == ChunkType::Addresses ||
+               type == ChunkType::ProbeBase || type == ChunkType::ProbeNumbers || type == ChunkType::GridPositions;
     }
 
     void add(ChunkType type, uint32_t subject, Content content, uint32_t record_bytes) {
@@ -128,9 +129,7 @@ class Writer {
         addArray(ChunkType::ProbePayload, std::span(probes.payload));
         addArray(ChunkType::GridPositions, std::span(probes.global.positions));
         addArray(ChunkType::GridLevels, std::span(probes.global.levels));
-        std::vector<std::array<uint32_t, 4>> corners;
-        for (const Tetrahedron& t : probes.global.tetrahedra) corners.push_back(t.probes);
-        addArray(ChunkType::GridTetrahedra, std::move(corners));
+        addArray(ChunkType::GridTetrahedra, storedTetrahedra(probes.global.tetrahedra, probes.global.positions.size()));
         addArray(ChunkType::GridVisibility, std::span(probes.global.visibility));
         addArray(ChunkType::GridStarts, std::span(probes.global.starts));
         addTable(ChunkType::GridBox, [&](ByteWriter& out) { out.put(probes.global.start); });

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -42,7 +43,10 @@ struct StartGrid {
 };
 static_assert(sizeof(StartGrid) == 36);
 
-// Probes over the level, joined by tetrahedra. Its probes come first in ProbeData's numbering.
+inline constexpr size_t grid_box_corners = 8;
+
+// Probes over the level, joined by tetrahedra. Its probes come first in ProbeData's numbering; the last
+// grid_box_corners of them are the corners of the box that it fills.
 struct GlobalGrid {
     std::vector<ProbePosition> positions;  // by the probe's number
     std::vector<uint8_t> levels;           // per probe: of refinement, 0 the coarsest; for tools

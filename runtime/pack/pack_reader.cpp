@@ -302,12 +302,13 @@ class Reader {
     }
 
     Expected<void> readTetrahedra(GlobalGrid& grid) {
-        std::vector<std::array<uint32_t, 4>> corners;
-        if (auto ok = array(ChunkType::GridTetrahedra, corners); !ok) return ok;
-        for (const auto& probes : corners) grid.tetrahedra.push_back({.probes = probes});
-        if (!joinFaces(grid.tetrahedra, grid.positions.size()))
-            return bad("chunk {} names probes that are not there, or three tetrahedra share a face",
+        std::vector<StoredTetrahedron> stored;
+        if (auto ok = array(ChunkType::GridTetrahedra, stored); !ok) return ok;
+        auto tetrahedra = restoredTetrahedra(stored, grid.positions.size());
+        if (!tetrahedra)
+            return bad("chunk {} tells of no tetrahedra, names probes that are not there, or has three share a face",
                        name(ChunkType::GridTetrahedra));
+        grid.tetrahedra = std::move(*tetrahedra);
         return {};
     }
 

@@ -39,6 +39,52 @@ std::vector<Face> facesByLowestProbe(std::span<const Tetrahedron> tetrahedra, st
     return faces;
 }
 
+// Probes' numbers beside the highest so far.
+class ProbeNames {
+   public:
+    explicit ProbeNames(size_t probe_count)
+        : plain_count_(static_cast<uint32_t>(probe_count - std::min(probe_count, grid_box_corners))) {}
+    uint32_t nameOf(uint32_t probe) {
+        const uint32_t name = next_ - probe;
+        count(probe);
+        return name;
+    }
+    uint32_t probeOf(uint32_t name) {
+        const uint32_t probe = next_ - name;
+        count(probe);
+        return probe;
+    }
+
+   private:
+    void count(uint32_t probe) {
+        if (probe < plain_count_) next_ = std::max(next_, probe + 1);
+    }
+    uint32_t plain_count_, next_ = 0;
+};
+
+// Of `earlier`, the corner that `t` has another probe at; 4: more than one.
+size_t cornerThatDiffers(const Tetrahedron& earlier, const Tetrahedron& t) {
+    size_t corner = 4;
+    for (size_t k = 0; k < 4; ++k) {
+        if (earlier.probes[k] == t.probes[k]) continue;
+        if (corner != 4) return 4;
+        corner = k;
+    }
+    return corner;
+}
+
+// `from` of the nearest earlier neighbour that `t`, number `i`, can be told by; 0: none.
+uint32_t tellingNeighbour(std::span<const Tetrahedron> tetrahedra, uint32_t i) {
+    uint32_t from = 0;
+    for (const uint32_t n : tetrahedra[i].neighbours) {
+        if (n >= i) continue;  // no_tetrahedron, too
+        const size_t corner = cornerThatDiffers(tetrahedra[n], tetrahedra[i]);
+        if (corner == 4 || (from != 0 && from / 4 < i - n)) continue;
+        from = 4 * (i - n) + static_cast<uint32_t>(corner);
+    }
+    return from;
+}
+
 }  // namespace
 
 StoredTables storedTables(const ReceiverView& tables) {
@@ -78,6 +124,47 @@ ReceiverTables restored(const StoredTables& stored, std::span<const uint32_t> re
         receiver += count;
     }
     return tables;
+}
+
+std::vector<StoredTetrahedron> storedTetrahedra(std::span<const Tetrahedron> tetrahedra, size_t probe_count) {
+    std::vector<StoredTetrahedron> stored;
+    stored.reserve(tetrahedra.size() + 3);
+    ProbeNames names(probe_count);
+    for (uint32_t i = 0; i < tetrahedra.size(); ++i) {
+        const auto& probes = tetrahedra[i].probes;
+        if (const uint32_t from = tellingNeighbour(tetrahedra, i)) {
+            stored.push_back({from, names.nameOf(probes[from % 4])});
+        } else {
+            for (const uint32_t probe : probes) stored.push_back({0, names.nameOf(probe)});
+        }
+    }
+    return stored;
+}
+
+std::optional<std::vector<Tetrahedron>> restoredTetrahedra(std::span<const StoredTetrahedron> stored,
+                                                           size_t probe_count) {
+    std::vector<Tetrahedron> tetrahedra;
+    tetrahedra.reserve(stored.size());
+    ProbeNames names(probe_count);
+    for (size_t i = 0; i < stored.size(); ++i) {
+        Tetrahedron t;
+        if (stored[i].from == 0) {
+            if (stored.size() - i < 4) return {};
+            for (size_t k = 0; k < 4; ++k) {
+                if (stored[i + k].from != 0) return {};
+                t.probes[k] = names.probeOf(stored[i + k].probe);
+            }
+            i += 3;
+        } else {
+            const size_t back = stored[i].from / 4;
+            if (back == 0 || back > tetrahedra.size()) return {};
+            t = tetrahedra[tetrahedra.size() - back];
+            t.probes[stored[i].from % 4] = names.probeOf(stored[i].probe);
+        }
+        tetrahedra.push_back(t);
+    }
+    if (!joinFaces(tetrahedra, probe_count)) return {};
+    return tetrahedra;
 }
 
 bool joinFaces(std::span<Tetrahedron> tetrahedra, size_t probe_count) {

@@ -145,18 +145,15 @@ TEST(GridPack, ACountOfLocalGridsAloneIsRefused) {
     EXPECT_THAT(pack.error().message, testing::HasSubstr("LGRD is malformed"));
 }
 
-// The file lists a tetrahedron's probes; who borders on whom is found when it is read (GridPack.EveryFieldComesBack
-// compares that with TetGen's neighbours).
+// The file tells tetrahedra by each other (FaceOrder.RecordsOfNoTetrahedraAreRefused tries what that allows); who
+// borders on whom is found when it is read (GridPack.EveryFieldComesBack compares that with TetGen's neighbours).
 TEST(GridPack, TetrahedraThatNobodyCanJoinAreRefused) {
     const PackFile whole(cook::packBytes(gridPack()));
     const std::vector<std::function<void(ChunkContent&)>> faults = {
-        [](ChunkContent& c) { c.write(0, 50u); },
-        [](ChunkContent& c) { c.write(8, UINT32_MAX); },
+        [](ChunkContent& c) { c.write(0, 4u); },  // from one before the first
+        [](ChunkContent& c) { c.write(4, 1u); },  // probe -1
         [](ChunkContent& c) { c.bytes.resize(c.bytes.size() - 4); },
-        // The first one three times.
-        [](ChunkContent& c) {
-            for (size_t byte = 0; byte < 32; ++byte) c.bytes[16 + byte] = c.bytes[byte % 16];
-        },
+        [](ChunkContent& c) { c.bytes.resize(c.bytes.size() + 8); },  // a corner alone
     };
     for (const auto& fault : faults) {
         PackFile file = whole;
