@@ -249,9 +249,10 @@ def door_variant(folder, name, doors):
 
 
 def cook_seconds(level, quality, folder, *options):
-    """Processor seconds of a cook, what it traced and what it stored."""
+    """Processor seconds of a cook, lamps whole, what it traced and what it stored."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    text = dimmer("cook", level, "-o", folder / "sets.dimmer", "--no-cache", "--quality", quality, *options)
+    text = dimmer("cook", level, "-o", folder / "sets.dimmer", "--no-cache", "--quality", quality,
+                  "--set", f"bake.{quality}.lamps_apart=0", *options)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     overlap = json.loads(dimmer("inspect", folder / "sets.dimmer", "--json", "-"))
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, text, overlap

@@ -145,7 +145,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     PackData pack;
     {
         const Stopwatch watch(stats.seconds["encode"]);
-        giveBackFreeMemory();
+        giveBackMuchFreeMemory();
         progress.stage("encode", 1);
         pack = encodePack(level, at.texels, baked, profile, quality_name, stats);
         progress.advance(1);

@@ -9,6 +9,7 @@
 #include <encode/encode.h>
 #include <pipeline/charted_level.h>
 #include <pipeline/cook_settings.h>
+#include <pipeline/lamps_apart.h>
 
 #include <tbb/parallel_for.h>
 
@@ -31,6 +32,7 @@ constexpr float same_normal_cos = 0.99f;
 
 // The cook up to its last gather.
 struct Rebake {
+    LampGroups lamps;  // level, series and gatherer know the parts
     std::unique_ptr<ChartedLevel> level;
     Texels texels;
     std::optional<EmitterSampler> emitters;
@@ -44,18 +46,20 @@ struct Rebake {
 Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress& progress) {
     const auto settings = readSettings(pack.data().settings_json);
     if (!settings) return std::unexpected(settings.error());
+    const Quality& quality = *settings->profile.quality(settings->quality);
+    auto bake = std::make_unique<Rebake>();
+    bake->settings = bakeSettings(settings->profile, quality, scene);
+    bake->lamps = takeLampsApart(scene, quality.lamps_apart);
+    bake->settings.group_thresholds = bake->lamps.ofParts(bake->settings.group_thresholds);
     auto charted = chartAgain(std::move(scene), pack.data());
     if (!charted) return std::unexpected(charted.error());
-    auto bake = std::make_unique<Rebake>();
     bake->level = std::move(*charted);
     const ChartedLevel& level = *bake->level;
-    const Quality& quality = *settings->profile.quality(settings->quality);
     bake->texels = sampleTexels(*level.rays, level.charts, quality.samples_per_texel);
     bake->emitters.emplace(*level.rays, meshGroups(level.scene));
     bake->paths.emplace(level.scene, doorsInSight(*level.rays));
     bake->gatherer.emplace(*level.rays, level.charts, bake->texels, *bake->emitters, *bake->paths);
     bake->taps.emplace(*level.rays, level.charts, bake->texels);
-    bake->settings = bakeSettings(settings->profile, quality, level.scene);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
 }
@@ -125,10 +129,11 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
 // Luminance of terms' light in a state of the sets with every door closed, and the variance of what was gathered.
 class Mixed {
    public:
-    Mixed(const DoorPaths& paths, const SetScales& scales, const ReferenceState& state) {
-        for (const Term& t : paths.terms()) {
-            const glm::vec3 weight = t.group == always_group ? glm::vec3(1) : state.set_weights[t.group - 1];
-            const glm::vec3 lit = weight * scales.of_group[t.group];
+    Mixed(const Rebake& bake, const ReferenceState& state) {
+        for (const Term& t : bake.paths->terms()) {
+            const uint32_t whole = bake.lamps.wholeOf(t.group);
+            const glm::vec3 weight = whole == always_group ? glm::vec3(1) : state.set_weights[whole - 1];
+            const glm::vec3 lit = weight * bake.level->scales.of_group[t.group];
             weights_.push_back(t.doors_open.empty() ? lit : glm::vec3(0));
         }
     }
@@ -226,9 +231,9 @@ struct Falloff {
         for (size_t i = 0; i < normals.size(); ++i)
             tilted_lux[i] += lux * (std::max(0.0f, glm::dot(normals[i], direction)) / direction.z);
     }
-    void multiply(glm::vec3 scale) {
-        light = multiplied(light, scale);
-        for (glm::vec3& lux : tilted_lux) lux *= scale;
+    void addScaled(const Falloff& other, glm::vec3 scale) {
+        light += multiplied(other.light, scale);
+        for (size_t i = 0; i < tilted_lux.size(); ++i) tilted_lux[i] += scale * other.tilted_lux[i];
     }
 };
 
@@ -346,14 +351,7 @@ void measureStorage(Storage& s, TermAccumulator<Falloff>& sum, std::span<const g
 Expected<void> checkRebake(const Scene& scene, const Pack& pack) {
     const auto charted = chartAgain(scene, pack.data());
     if (!charted) return std::unexpected(charted.error());
-    const auto settings = readSettings(pack.data().settings_json);
-    if (!settings) return std::unexpected(settings.error());
-    if (settings->profile.quality(settings->quality)->lamps_apart == 0) return {};
-    return fail(
-        ErrorCode::BadInput,
-        fmt::format("{}: sets are baked again whole to tell errors apart, and the pack's were baked lamp by lamp; "
-                    "cook it with --set bake.{}.lamps_apart=0.",
-                    scene.file, settings->quality));
+    return {};
 }
 
 Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::span<const VerifyPoint> points,
@@ -362,7 +360,7 @@ Expected<ErrorCauses> errorCauses(const Scene& scene, const Pack& pack, std::spa
     const auto bake = rebake(scene, pack, progress);
     if (!bake) return std::unexpected(bake.error());
     progress.stage("causes of error", points.size());
-    const Mixed mixed(*(*bake)->paths, (*bake)->level->scales, state);
+    const Mixed mixed(**bake, state);
     std::vector<Steps> steps(points.size());
     tbb::parallel_for(size_t{0}, points.size(), [&](size_t i) {
         steps[i] = stepsAt(**bake, pack, points[i], pairs[i], mixed);
@@ -388,9 +386,11 @@ Expected<std::vector<FormatError>> formatErrors(const Scene& scene, const Pack& 
         TermAccumulator<Falloff> sum(group_count);
         const auto normals = tiltedNormals(static_cast<uint32_t>(i));
         gatherFalloff(**bake, *footprint.centre, static_cast<uint32_t>(i), normals, sum);
-        for (const uint32_t g : sum.touched()) sum[g].multiply((*bake)->level->scales.of_group[g]);
+        TermAccumulator<Falloff> whole(group_count);
+        for (const uint32_t g : sum.touched())
+            whole[(*bake)->lamps.wholeOf(g)].addScaled(sum[g], (*bake)->level->scales.of_group[g]);
         at[i] = storages(pack.exposure());
-        for (Storage& s : at[i]) measureStorage(s, sum, normals);
+        for (Storage& s : at[i]) measureStorage(s, whole, normals);
     });
     std::vector<FormatError> out;
     for (const Storage& kind : storages(pack.exposure())) {

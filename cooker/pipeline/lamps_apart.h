@@ -14,6 +14,7 @@ struct LampGroups {
     std::vector<std::vector<ElementRef>> combinations;  // likewise
     std::vector<uint32_t> whole;                        // per light group of the parts: the level's own
     bool none() const { return whole.empty(); }         // was taken apart
+    uint32_t wholeOf(uint32_t group) const { return none() ? group : whole[group]; }
 
     // What is said of the level's groups, said of the parts.
     std::vector<float> ofParts(const std::vector<float>& of_groups) const;

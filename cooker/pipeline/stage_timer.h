@@ -25,7 +25,7 @@ class StageTimer final : public Progress {
 
     void stage(std::string_view name, uint64_t total) override {
         endStage();
-        giveBackFreeMemory();
+        giveBackMuchFreeMemory();
         name_ = name;
         progress_.stage(name, total);
     }

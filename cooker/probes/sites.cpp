@@ -10,6 +10,7 @@
 #include <bit>
 #include <cmath>
 #include <map>
+#include <string_view>
 
 namespace dimmer::cook {
 namespace {
@@ -306,15 +307,31 @@ GroupSums sumsOfGroups(const Sparse<ProbeTermLight>& light, std::span<const Term
     return sums;
 }
 
-std::vector<float> weightsOfGroups(const Scene& scene, const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
-                                   std::span<const SiteRow> order) {
-    const uint32_t groups = 1 + static_cast<uint32_t>(scene.light_sets.size());
+// Per group a number: always-on light's is 0, and sets taken apart (pipeline/lamps_apart.h) have one for all parts.
+std::vector<uint32_t> wholesOf(const Scene& scene) {
+    std::vector<uint32_t> wholes = {0};
+    std::map<std::string_view, uint32_t> numbers;
+    for (const SceneLightSet& set : scene.light_sets) {
+        const auto fresh = static_cast<uint32_t>(1 + numbers.size());
+        const std::string_view name = set.part_of.empty() ? set.name : set.part_of;
+        wholes.push_back(set.always_on ? 0 : numbers.try_emplace(name, fresh).first->second);
+    }
+    return wholes;
+}
+
+// Of what is taken apart all parts together count as one whole.
+std::vector<float> weightsOfGroups(std::span<const uint32_t> wholes, const Sparse<ProbeTermLight>& light,
+                                   std::span<const Term> terms, std::span<const SiteRow> order) {
+    const auto groups = static_cast<uint32_t>(wholes.size());
     GroupSums sums = sumsOfGroups(light, terms, groups, [&](size_t i) { return order[i].block == 0; });
     if (std::ranges::max(sums.lux) == 0) sums = sumsOfGroups(light, terms, groups, [](size_t) { return true; });
+    std::vector<float> parts(groups);  // per whole: that have light
+    for (uint32_t g = 0; g < groups; ++g) parts[wholes[g]] += sums.lux[g] > 0 ? 1 : 0;
     std::vector<float> weights(groups);
     for (uint32_t g = 0; g < groups; ++g)
         if (sums.lux[g] > 0)
-            weights[g] = static_cast<float>(sums.rows[g] / sums.lux[g]) * (isAlwaysOn(scene, g) ? 1 : weight_of_sets);
+            weights[g] = static_cast<float>(sums.rows[g] / sums.lux[g]) * (wholes[g] == 0 ? 1 : weight_of_sets) /
+                         parts[wholes[g]];
     return weights;
 }
 
@@ -467,13 +484,14 @@ Sparse<ProbeTermLight> SiteLight::take() {
 
 std::vector<FitValue> statesOf(const Scene& scene, const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
                                std::span<const SiteRow> order) {
-    const std::vector<float> weights = weightsOfGroups(scene, light, terms, order);
+    const std::vector<uint32_t> wholes = wholesOf(scene);
+    const std::vector<float> weights = weightsOfGroups(wholes, light, terms, order);
     std::vector<FitValue> states(light.rows(), FitValue{});
     tbb::parallel_for(size_t{0}, light.rows(), [&](size_t i) {
         for (const ProbeTermLight& l : light.row(i)) {
             const Term& term = terms[l.term];
             if (!term.doors_open.empty()) continue;
-            const size_t half = isAlwaysOn(scene, term.group) ? 0 : term.group % 2;
+            const size_t half = wholes[term.group] % 2;
             for (const size_t state : {size_t{0}, 1 + half})
                 for (size_t k = 0; k < 9; ++k)
                     states[i][9 * state + k] += weights[term.group] * luminance(l.light.radiance[k]);

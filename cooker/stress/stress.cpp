@@ -5,11 +5,9 @@
 
 #include <fmt/format.h>
 #include <format/probe.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
-#include <fstream>
 
 namespace dimmer::cook {
 namespace {
@@ -17,14 +15,10 @@ namespace {
 constexpr int updates_to_rest_max = 4;
 constexpr size_t words_per_probe = sizeof(ProbeRecord) / sizeof(uint32_t);
 
-// Of this process, from the second field of Linux's /proc/self/statm, in pages; 0 elsewhere. What the allocator merely
-// keeps from the last check's fresh blend is given back first.
-uint64_t residentBytes() {
+// What the allocator merely keeps from the last check's fresh blend does not count.
+uint64_t bytesInUse() {
     giveBackFreeMemory();
-    std::ifstream statm("/proc/self/statm");
-    uint64_t all = 0, resident = 0;
-    statm >> all >> resident;
-    return statm ? resident * static_cast<uint64_t>(sysconf(_SC_PAGESIZE)) : 0;
+    return residentBytes();
 }
 
 // A channel with the exponent 31 is an infinity or a NaN in R11G11B10F; E5B9G9R9 has neither.
@@ -146,7 +140,7 @@ class StressRun {
     }
 
     void weigh(double done) {
-        const uint64_t resident = residentBytes();
+        const uint64_t resident = bytesInUse();
         uint64_t device = 0;
         for (const auto& e : executors_) device += e->deviceBytes();
         if (report_.resident_start_bytes == 0 && done >= 0.1) {

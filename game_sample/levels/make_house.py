@@ -472,6 +472,8 @@ def build():
             # What `dimmer cook --suggest-combinations` says: all three doors open into the hall, and each is lit by what
             # the others, closed, reflect.
             "dimmer_combinations": [["door:front", "door:den"], ["door:den", "door:living"], ["door:front", "door:living"]],
+            # Its lamps are what one tries out at preview: each is baked by itself, so that an edit bakes that one alone.
+            "dimmer_settings": "bake.preview.lamps_apart=8",
         },
     )
     add_places(gltf)

@@ -79,21 +79,26 @@ TEST(Sites, StandMoreCloselyNearSurfaces) {
     EXPECT_GT(far_share(false), expected * 0.9 - 0.015);
 }
 
-// A set that can be off counts a twentieth of what never is, which a lamp of its own may be; bright or dim, as all
-// count by their own mean.
+// A set that can be off counts a twentieth of what never is; bright or dim, as all count by their own mean; and taken
+// apart, lamp by lamp, together what it counts as a whole.
 TEST(Sites, PlacementSeesSetsAsATwentiethOfWhatIsAlwaysOn) {
     Scene scene;
-    scene.light_sets = {{.name = "bulbs"}, {.name = "always-on light, lamp sun", .always_on = true}};
-    const std::vector<Term> terms = {{0, {}, {}}, {1, {}, {}}, {2, {}, {}}};
+    scene.light_sets = {{.name = "bulbs"},
+                        {.name = "hall, lamp a", .part_of = "hall"},
+                        {.name = "hall, lamp b", .part_of = "hall"},
+                        {.name = "always-on light, lamp sun", .always_on = true}};
+    const std::vector<Term> terms = {{0, {}, {}}, {1, {}, {}}, {2, {}, {}}, {3, {}, {}}, {4, {}, {}}};
     ProbeLight dim, bright;
     dim.radiance[0] = glm::vec3(0.1f);
     bright.radiance[0] = glm::vec3(50);
     Sparse<ProbeTermLight>::Builder rows(1);
-    rows.put(0, std::vector<ProbeTermLight>{{0, dim, 0, 0}, {1, bright, 0, 0}, {2, bright, 0, 0}});
+    rows.put(0, std::vector<ProbeTermLight>{
+                    {0, dim, 0, 0}, {1, bright, 0, 0}, {2, bright, 0, 0}, {3, dim, 0, 0}, {4, bright, 0, 0}});
     const std::vector<FitValue> states = statesOf(scene, rows.finish(), terms, std::vector<SiteRow>{{0, 0}});
-    const float all = states[0][0], always = states[0][9], sets = states[0][18];
-    EXPECT_NEAR(always / sets, 2 / 0.05f, 1e-3);
-    EXPECT_NEAR(all, always + sets, 1e-6 * all);
+    // The first set is of one half, the second of the other, with what is always on.
+    const float all = states[0][0], always_and_hall = states[0][9], bulbs = states[0][18];
+    EXPECT_NEAR(always_and_hall / bulbs, (1 + 0.05f) / 0.05f, 1e-3);
+    EXPECT_NEAR(all, always_and_hall + bulbs, 1e-6 * all);
 }
 
 }  // namespace
