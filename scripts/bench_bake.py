@@ -119,8 +119,23 @@ def reference_table(levels, paths, folder):
     return table(["level", "points", "state", "n", "chi²/n", "its σ", "largest z", "mean difference"], rows)
 
 
+def given_openings(level, pack, folder):
+    """What opening each door does at the points that it changes most, and the light there with the door open."""
+    file = TRUTH / f"{level}.openings.json"
+    for i, opening in enumerate(json.loads(file.read_text())["openings"] if file.exists() else []):
+        ours, truth = {}, {}
+        for name, state in (("closed", ""), ("open", opening["state"])):
+            out = folder / "sample.csv"
+            dimmer("sample", pack, "--points", TRUTH / f"{level}.opening_{i}.points.csv", "--state", state, "-o", out)
+            ours[name], truth[name] = read(out), read(TRUTH / f"{level}.opening_{i}.{name}.csv")
+        error, bias, noise, n = effect_error(minus(ours["open"], ours["closed"]), minus(truth["open"], truth["closed"]))
+        there = [(v, t) for (v, _), (t, _) in zip(ours["open"], truth["open"]) if not math.isnan(v)]
+        light = sum(abs(v - t) for v, t in there) / sum(t for _, t in there)
+        yield [level, opening["door"], percent(error), f"{100 * bias:+.2f} %", percent(noise), str(n), percent(light)]
+
+
 def pack_tables(levels, quality, folder):
-    errors, effects = [], []
+    errors, effects, doors = [], [], []
     for level in levels:
         pack = folder / f"{level}.dimmer"
         started = time.monotonic()
@@ -147,8 +162,12 @@ def pack_tables(levels, quality, folder):
                 percent(effect[0]), f"{100 * effect[1]:+.2f} %", percent(effect[2]), str(effect[3])]
             effects.append([level, what, *cells])
             print(*effects[-1], flush=True)
+        for row in given_openings(level, pack, folder):
+            doors.append(row)
+            print(*row, flush=True)
     return (table(["level", "state", "points", "mean error", "95th percentile", "bias"], errors),
-            table(["level", "what", "error", "bias", "truth's noise", "points"], effects))
+            table(["level", "what", "error", "bias", "truth's noise", "points"], effects),
+            table(["level", "door opened", "error", "bias", "truth's noise", "points", "light there"], doors))
 
 
 def verify_tables(levels, quality, points, paths, folder):

@@ -107,15 +107,23 @@ struct Gatherer::Ray {
     typename Light::Weights weights = Light::weightsOf(tangent);
 };
 
-// Rays that were traced, and where they read light, in order. What known and traced rays read is added up in one order:
-// remembered rays give the same sums.
+// Rays that were traced, and what they bring, in order. All that a ray brings waits here, be it there at once or not:
+// where a batch ends depends on what else is baked and on which ends are known, and what is added up in another order
+// is another sum.
 template <class Light>
 struct Gatherer::Batch {
+    enum class What : uint8_t { Receiver, Sky, Emitter };
     struct End {
-        uint32_t ray, receiver, path;
+        uint32_t ray;
+        What what;
+        uint32_t number, path;  // the receiver, or of `emitted`
     };
-    // A receiver for each leaf that a ray meets, and one behind them.
-    static constexpr uint32_t ends_max = rays_ahead * (LeafHits::max + 1);
+    struct Emitted {
+        uint32_t term;
+        glm::vec3 lux;
+    };
+    // A surface for each leaf that a ray meets, and one behind them; each may shine as well.
+    static constexpr uint32_t hits_max = rays_ahead * (LeafHits::max + 1);
 
     explicit Batch(const Gatherer& of) : gatherer(of) {}
 
@@ -124,16 +132,39 @@ struct Gatherer::Batch {
         if (rays == rays_ahead) flush();
         return traced[rays++];
     }
-    void readLater(uint32_t receiver, uint32_t path) { ends[count++] = {rays - 1, receiver, path}; }
+    void readLater(uint32_t receiver, uint32_t path) { put(What::Receiver, receiver, path); }
+    void takeSkyLater(uint32_t path) { put(What::Sky, 0, path); }
+    void addLater(uint32_t term, glm::vec3 lux) {
+        emitted[emitted_count] = {term, lux};
+        put(What::Emitter, emitted_count++, free_path);
+    }
     void flush() {
-        for (uint32_t e = 0; e < count; ++e) gatherer.takeFrom(*traced[ends[e].ray], ends[e].receiver, ends[e].path);
-        rays = count = 0;
+        for (uint32_t e = 0; e < count; ++e) {
+            const End& end = ends[e];
+            const Ray<Light>& ray = *traced[end.ray];
+            switch (end.what) {
+                case What::Receiver:
+                    gatherer.takeFrom(ray, end.number, end.path);
+                    break;
+                case What::Sky:
+                    gatherer.takeSky(ray, end.path);
+                    break;
+                case What::Emitter:
+                    ray.sum[emitted[end.number].term].add(emitted[end.number].lux, ray.weights);
+                    break;
+            }
+        }
+        rays = count = emitted_count = 0;
     }
 
+   private:
+    void put(What what, uint32_t number, uint32_t path) { ends[count++] = {rays - 1, what, number, path}; }
+
     const Gatherer& gatherer;
-    uint32_t rays = 0, count = 0;
+    uint32_t rays = 0, count = 0, emitted_count = 0;
     std::array<std::optional<Ray<Light>>, rays_ahead> traced;
-    std::array<End, ends_max> ends;
+    std::array<End, 2 * hits_max> ends;
+    std::array<Emitted, hits_max> emitted;
 };
 
 TangentFrame Gatherer::frameOf(const SamplePoint& point) const {
@@ -182,7 +213,7 @@ void Gatherer::gather(const GatherFrom& from, const GatherOptions& options, cons
                                                      origin.position_m, world, d, batch);
         for (const PathEnd& p : known)
             if (p.end == RayEnd::sky)
-                takeSky(ray, p.path);
+                batch.takeSkyLater(p.path);
             else if (outgoing)
                 batch.readLater(p.end, p.path);
         if (!known.empty()) continue;
@@ -274,7 +305,7 @@ uint32_t Gatherer::follow(const Ray<Light>& ray, uint32_t seed, std::vector<Path
     if (path == no_path || (path == free_path && ray.forDoors())) {
         // Stopped by a leaf, or not for this ray.
     } else if (!hit) {
-        takeSky(ray, path);
+        ray.batch.takeSkyLater(path);
         end = RayEnd::sky;
     } else {
         if (const uint32_t found = take(ray, *hit, path); found != no_index) end = found;
@@ -378,7 +409,7 @@ uint32_t Gatherer::take(const Ray<Light>& ray, const Hit& hit, uint32_t path) co
                               emitters_.pdf(emitters_.cellAt(ray.origin), *e, hit.distance_m, cos_emitter);
         const float by_hit = ray.density(path);
         if (const uint32_t term = wantedOf(e->group, path, ray.sum); term != no_term)
-            ray.sum[term].add(e->radiance_cd_m2 * (ray.alone(path) * by_hit / (by_hit + by_area)), ray.weights);
+            ray.batch.addLater(term, e->radiance_cd_m2 * (ray.alone(path) * by_hit / (by_hit + by_area)));
     }
     uint32_t found = receiverOf(unwrap_, texels_, hit);
     if (found == no_index && !models_->empty())
