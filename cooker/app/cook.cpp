@@ -89,6 +89,9 @@ nlohmann::ordered_json fittedJson(const CookResult& result) {
         for (const Change& c : remedy.changes) changes[c.key] = std::stod(fmt::format("{}", c.to));
         list.push_back({{"changes", changes},
                         {"saves", remedy.saves},
+                        {"energy", std::stod(fmt::format("{:.4g}", remedy.energy))},
+                        {"energy_of", remedy.energy > 0 ? nlohmann::ordered_json(remedy.energy_of)
+                                                        : nlohmann::ordered_json(nullptr)},
                         {"error", remedy.texels ? nlohmann::ordered_json(std::stod(fmt::format("{:.4g}", remedy.error)))
                                                 : nlohmann::ordered_json(nullptr)}});
     }
@@ -257,7 +260,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                 "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
                 "probes, until it fits; "
                 "the table says what was changed and the mean error that it adds");
-    c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not");
+    c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not")
+        ->excludes(no_cache)
+        ->excludes(per_set_passes)
+        ->excludes(grid_baseline);
     c->add_option(
         "--json", a->json,
         "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");

@@ -2,6 +2,11 @@
 
 #include <charts/raster.h>
 
+#include <bit>
+#include <map>
+#include <numeric>
+#include <utility>
+
 namespace dimmer::cook {
 namespace {
 
@@ -40,6 +45,34 @@ void dropInvalidUnwraps(Scene& scene) {
         mesh.uv1_fault = unwrapFault(mesh);
         if (!mesh.uv1_fault.empty()) mesh.uv1.clear();
     }
+}
+
+std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span<const uint32_t> triangles) {
+    std::vector<uint32_t> lower(triangles.size());  // a triangle of the same piece, or the piece's first itself
+    std::iota(lower.begin(), lower.end(), 0u);
+    const auto firstOf = [&](uint32_t i) {
+        while (lower[i] != i) i = lower[i] = lower[lower[i]];
+        return i;
+    };
+    std::map<std::pair<uint32_t, uint32_t>, uint32_t> triangle_at;  // per corner of the unwrap, by its bits
+    for (uint32_t i = 0; i < triangles.size(); ++i)
+        for (int k = 0; k < 3; ++k) {
+            const glm::vec2 uv = mesh.uv1[mesh.triangles[triangles[i]][k]] + 0.0f;  // -0 is 0
+            const std::pair corner(std::bit_cast<uint32_t>(uv.x), std::bit_cast<uint32_t>(uv.y));
+            const uint32_t a = firstOf(i), b = firstOf(triangle_at.try_emplace(corner, i).first->second);
+            lower[std::max(a, b)] = std::min(a, b);
+        }
+    std::vector<std::vector<uint32_t>> pieces;
+    std::vector<uint32_t> piece_of(triangles.size());
+    for (uint32_t i = 0; i < triangles.size(); ++i) {
+        const uint32_t first = firstOf(i);
+        if (first == i) {
+            piece_of[i] = static_cast<uint32_t>(pieces.size());
+            pieces.emplace_back();
+        }
+        pieces[piece_of[first]].push_back(i);
+    }
+    return pieces;
 }
 
 }  // namespace dimmer::cook

@@ -3,10 +3,18 @@
 
 #include <scene/scene.h>
 
+#include <cstdint>
+#include <span>
+#include <vector>
+
 namespace dimmer::cook {
 
 // Empties SceneMesh::uv1 where it is no unwrap (inside 0..1, every triangle with area, no two on one spot) and says why
 // in uv1_fault. Only of meshes that get a lightmap.
 void dropInvalidUnwraps(Scene& scene);
+
+// The given triangles (of SceneMesh::triangles) by the pieces of the unwrap that they lie in, which share no corner:
+// indices into `triangles`, ascending, the piece with the first triangle first.
+std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span<const uint32_t> triangles);
 
 }  // namespace dimmer::cook

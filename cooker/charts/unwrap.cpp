@@ -1,5 +1,6 @@
 #include <charts/unwrap.h>
 
+#include <charts/file_uv.h>
 #include <charts/planar.h>
 #include <charts/raster.h>
 
@@ -60,38 +61,65 @@ void warnOfCoarseness(const RayScene& rays, Unwrap& out, uint32_t face, float te
                            what, texels, side_max, texels / usable)});
 }
 
-// A chart of the file's own UVs, scaled to the wanted density on average.
-Placed fileChart(const RayScene& rays, Unwrap& out, std::vector<uint32_t> ids, float density, uint32_t side_max) {
+// What a mesh's own UVs cover of some faces, and the faces themselves.
+struct FileUvs {
+    std::vector<uint32_t> ids;
+    glm::vec2 low{1}, high{0};
+    glm::uvec2 texels(float scale) const { return glm::uvec2(glm::ceil((high - low) * scale)) + 2 * padding_texels; }
+};
+
+// The file's own UVs, scaled to the wanted density on average: one chart, or where that takes fewer texels one for each
+// piece of the unwrap, as those of a mesh may lie anywhere in an atlas of many.
+std::vector<Placed> fileCharts(const RayScene& rays, Unwrap& out, const std::vector<uint32_t>& ids, float density,
+                               uint32_t side_max) {
     const std::vector<Face>& faces = out.faces;
     const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh];
+    const auto triangleOf = [&](uint32_t id) { return rays.triangles()[faces[id].triangle].triangle; };
+    const auto uvOf = [&](uint32_t id, int i) { return mesh.uv1[mesh.triangles[triangleOf(id)][i]]; };
     double area_m2 = 0, area_uv = 0;
-    glm::vec2 low(1), high(0);
-    auto uvOf = [&](uint32_t id, int i) {
-        return mesh.uv1[mesh.triangles[rays.triangles()[faces[id].triangle].triangle][i]];
+    const auto add = [&](FileUvs& part, uint32_t id) {
+        part.ids.push_back(id);
+        for (int i = 0; i < 3; ++i)
+            part.low = glm::min(part.low, uvOf(id, i)), part.high = glm::max(part.high, uvOf(id, i));
     };
+    FileUvs whole;
+    std::vector<uint32_t> triangles;
     for (uint32_t id : ids) {
         const auto c = corners(rays, faces[id]);
         area_m2 += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
         area_uv += 0.5 * std::abs(cross2d(uvOf(id, 1) - uvOf(id, 0), uvOf(id, 2) - uvOf(id, 0)));
-        for (int i = 0; i < 3; ++i) low = glm::min(low, uvOf(id, i)), high = glm::max(high, uvOf(id, i));
+        add(whole, id);
+        triangles.push_back(triangleOf(id));
     }
-    float scale = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
-    const float extent = std::max(high.x - low.x, high.y - low.y);
-    warnOfCoarseness(rays, out, ids[0], scale * extent, side_max);
-    scale = std::min(scale, (static_cast<float>(side_max - 2 * padding_texels) - 1) / extent);
-    const glm::vec2 size = glm::ceil((high - low) * scale);
-    Placed placed{static_cast<uint32_t>(size.x) + 2 * padding_texels,
-                  static_cast<uint32_t>(size.y) + 2 * padding_texels,
-                  std::move(ids),
-                  {},
-                  true};
-    for (uint32_t id : placed.faces) {
-        std::array<glm::vec2, 3> uv;
-        for (int i = 0; i < 3; ++i)
-            uv[static_cast<size_t>(i)] = (uvOf(id, i) - low) * scale + static_cast<float>(padding_texels);
-        placed.uv_texels.push_back(uv);
+    std::vector<FileUvs> parts;
+    for (const auto& piece : unwrapPieces(mesh, triangles)) {
+        FileUvs& part = parts.emplace_back();
+        for (const uint32_t i : piece) add(part, ids[i]);
     }
-    return placed;
+    const float scale = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
+    const auto areaAt = [&](const FileUvs& part) {
+        const glm::vec2 size = (part.high - part.low) * scale + static_cast<float>(2 * padding_texels);
+        return double{size.x} * double{size.y};
+    };
+    double in_parts = 0;
+    for (const FileUvs& part : parts) in_parts += areaAt(part);
+    if (in_parts >= areaAt(whole)) parts = {std::move(whole)};
+    std::vector<Placed> charts;
+    for (FileUvs& part : parts) {
+        const float extent = std::max(part.high.x - part.low.x, part.high.y - part.low.y);
+        warnOfCoarseness(rays, out, part.ids[0], scale * extent, side_max);
+        const float fits = std::min(scale, (static_cast<float>(side_max - 2 * padding_texels) - 1) / extent);
+        const glm::uvec2 texels = part.texels(fits);
+        Placed placed{texels.x, texels.y, std::move(part.ids), {}, true};
+        for (uint32_t id : placed.faces) {
+            std::array<glm::vec2, 3> uv;
+            for (int i = 0; i < 3; ++i)
+                uv[static_cast<size_t>(i)] = (uvOf(id, i) - part.low) * fits + static_cast<float>(padding_texels);
+            placed.uv_texels.push_back(uv);
+        }
+        charts.push_back(std::move(placed));
+    }
+    return charts;
 }
 
 // A planar chart, its grid fitted so that the rectangle's edges fall on texel edges.
@@ -209,10 +237,11 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
              mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[rays.triangles()[face.triangle].triangle]});
         planar_ids.push_back(id);
     }
-    for (auto& [m, ids] : file_faces)
-        charts.push_back(fileChart(rays, out, std::move(ids),
-                                   scene.meshes[m].texels_per_metre.value_or(options.texels_per_metre),
-                                   options.page_size));
+    for (const auto& [m, ids] : file_faces)
+        for (Placed& chart :
+             fileCharts(rays, out, ids, scene.meshes[m].texels_per_metre.value_or(options.texels_per_metre),
+                        options.page_size))
+            charts.push_back(std::move(chart));
     auto blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
     for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, blocked)) {
         warnOfCoarseness(rays, out, planar_ids[c.faces[0]], std::max(c.size_m.x, c.size_m.y) * c.texels_per_metre,

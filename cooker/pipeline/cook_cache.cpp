@@ -34,6 +34,7 @@ void put(const Remedy& remedy, format::ByteWriter& out) {
     out.put(remedy.saves);
     out.put(remedy.error);
     out.put(remedy.energy);
+    out.putString(remedy.energy_of);
     for (const bool flag : {remedy.fits, remedy.moves_light, remedy.texels}) out.put(static_cast<uint32_t>(flag));
 }
 
@@ -48,6 +49,7 @@ Remedy getRemedy(format::ByteReader& in) {
     remedy.saves = in.get<uint64_t>();
     remedy.error = in.get<double>();
     remedy.energy = in.get<double>();
+    remedy.energy_of = in.getString();
     for (bool* flag : {&remedy.fits, &remedy.moves_light, &remedy.texels}) *flag = in.get<uint32_t>() != 0;
     return remedy;
 }

@@ -122,6 +122,10 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
                    scaled(cost.probe_records, std::max(0.0, 1 - recordsLeft(recordsNow(losses), losses.bytes(rungs))));
     remedy.error = loss.error;
     remedy.energy = loss.energy;
+    if (loss.energy > 0)
+        remedy.energy_of = loss.energy_group == always_group
+                               ? "what is always on, through doors"
+                               : fmt::format("set '{}'", pack.elements[loss.energy_group - 1].name);
     remedy.fits =
         exceeded(losses, limits, rungs) == nullptr && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     const auto raised = [&](uint32_t group) {
@@ -359,7 +363,7 @@ std::string Remedy::text() const {
         changes.size() > named_max ? fmt::format(" and {} more", changes.size() - named_max) : std::string();
     return fmt::format("{}{}: saves {}{}{}{}", fmt::join(parts, ", "), more, humanBytes(saves),
                        texels ? fmt::format(", adds a mean error of {:.2f} %", 100 * error) : "",
-                       energy > 0 ? fmt::format(", drops up to {:.2f} % of a set's light", 100 * energy) : "",
+                       energy > 0 ? fmt::format(", drops {:.2f} % of the light of {}", 100 * energy, energy_of) : "",
                        moves_light ? ", coarsens the light of models by what is not predicted" : "");
 }
 
@@ -383,8 +387,10 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
         by(firstFitting(losses, limits, no_index));
         if (const uint32_t largest = largestSet(pack, cost); largest > 0) by(firstFitting(losses, limits, largest));
     }
-    // What is not predicted comes last.
-    std::ranges::stable_sort(found, {}, [](const Remedy& r) { return std::tuple(!r.fits, r.moves_light, r.error); });
+    // What is not predicted comes last, but where nothing else helps.
+    const bool grid_is_over = gridIsOver(cost, profile) || localGridsAreOver(cost, profile);
+    std::ranges::stable_sort(
+        found, {}, [&](const Remedy& r) { return std::tuple(!r.fits, r.moves_light != grid_is_over, r.error); });
     return found;
 }
 

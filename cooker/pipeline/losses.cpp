@@ -182,7 +182,11 @@ Loss LossTable::loss(const Rungs& rungs) const {
     };
     const Held before = held(Rungs(groupCount(), 0)), after = held(rungs);
     Loss loss{before.bytes - after.bytes, std::max(0.0, before.error - after.error), 0};
-    for (uint32_t g = 0; g < groupCount(); ++g) loss.energy = std::max(loss.energy, before.energy[g] - after.energy[g]);
+    for (uint32_t g = 0; g < groupCount(); ++g)
+        if (const double lost = before.energy[g] - after.energy[g]; lost > loss.energy) {
+            loss.energy = lost;
+            loss.energy_group = g;
+        }
     return loss;
 }
 

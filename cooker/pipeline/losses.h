@@ -23,7 +23,8 @@ using Rungs = std::vector<uint8_t>;
 struct Loss {
     uint64_t bytes = 0;  // of records; not the bases of receivers that keep none
     double error = 0;    // mean over surfaces of the light that is lost over the light there, in luminance
-    double energy = 0;   // share of the groups' stored light
+    double energy = 0;   // share of the stored light of the group that loses most
+    uint32_t energy_group = 0;
 };
 
 // What records of texels take.

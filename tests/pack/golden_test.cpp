@@ -1,9 +1,11 @@
 // Packs written by the builds of every format version so far (tests/golden/pack_v*.dimmer, the same small content in
 // each): read, or refused by version. A new version adds a file, written by the build that introduced it.
 #include <dimmer/cpu_runtime.h>
+#include <format/hash.h>
 #include <format/layout.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pack/pack_data.h>
 
 #include <fmt/format.h>
 
@@ -15,6 +17,25 @@ using testing::HasSubstr;
 
 Expected<Pack> openGolden(uint32_t version) {
     return Pack::open(fmt::format("{}/tests/golden/pack_v{}.dimmer", DIMMER_SOURCE_DIR, version));
+}
+
+// Of values as they were when the file was written.
+uint64_t hashOf(const auto& values) {
+    return format::chunkHash(std::as_bytes(std::span(values)));
+}
+
+// Since version 8, whose tetrahedra are told by each other.
+void expectGrids(const ProbeData& probes) {
+    EXPECT_EQ(hashOf(probes.base), 5338456095402337698u);
+    EXPECT_EQ(hashOf(probes.numbers), 11401258628283044530u);
+    EXPECT_EQ(hashOf(probes.payload), 15134233505589573710u);
+    EXPECT_EQ(hashOf(probes.global.positions), 7384791458399739505u);
+    EXPECT_EQ(hashOf(probes.global.levels), 3416448411842548136u);
+    EXPECT_EQ(hashOf(probes.global.tetrahedra), 4890589981881953613u);
+    EXPECT_EQ(hashOf(probes.global.visibility), 3825913768731029766u);
+    EXPECT_EQ(hashOf(probes.global.starts), 16100192548216535724u);
+    ASSERT_EQ(probes.local.size(), 1u);
+    EXPECT_EQ(probes.local[0].counts, (std::array<uint32_t, 3>{2, 2, 2}));
 }
 
 void expectContent(const Pack& pack) {
@@ -37,9 +58,10 @@ void expectContent(const Pack& pack) {
     EXPECT_NEAR(modelPosition(barrel, barrel.vertices[1])[1], 0.3967346f, 1e-6f);
     EXPECT_EQ(modelTransfer(barrel.vertices[0], {}).coefficients[0], transfer_bounds[0]);
     EXPECT_EQ(modelTransfer(barrel.vertices[0], {}).coefficients[1], -transfer_bounds[1]);
+    expectGrids(pack.data().probes);
     CpuRuntime runtime(pack);
     ASSERT_TRUE(runtime.apply("hall=0.5,door:front=1"));
-    EXPECT_EQ(runtime.update().receivers, 2u);
+    EXPECT_EQ(runtime.update().receivers, 2u + 20);  // texels and probes
 }
 
 TEST(PackGolden, EveryVersionIsReadOrRefusedByName) {

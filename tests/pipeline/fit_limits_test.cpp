@@ -74,6 +74,26 @@ TEST(FitLimits, NothingIsBegunThatTheCoarsestPagesDoNotEnd) {
     EXPECT_TRUE(fittingRemedy(withGlobalProbes(1000), cost, profile, {}).changes.empty());
 }
 
+// Records, pages and the grid are all too large: thresholds or density alone would leave out what the grid needs, and a
+// message names three ways.
+TEST(FitLimits, WhatAGridNeedsIsNamedFirstWhereNothingIsEnough) {
+    PackCost cost;
+    cost.base_lightmap = 256000;
+    cost.global_grid = 28000;
+    Profile profile;
+    profile.budget_base_lightmaps = 128000;
+    const auto pages_alone = remedies(withGlobalProbes(1000), cost, profile, oneChart(false));
+    ASSERT_FALSE(pages_alone.empty());
+    EXPECT_EQ(pages_alone[0].changes.at(0).key, density_key);
+    EXPECT_TRUE(pages_alone[0].fits);
+    profile.budget_global_grid = 14000;
+    const auto both = remedies(withGlobalProbes(1000), cost, profile, oneChart(false));
+    ASSERT_GE(both.size(), 2u);
+    EXPECT_EQ(both[0].changes.at(0).key, "grids.probes_max");
+    EXPECT_FALSE(both[0].fits);
+    EXPECT_EQ(both[1].changes.at(0).key, density_key);
+}
+
 // Fixed pages of 20 kB and a grid of 80: of 30 kB the grid's share would be 24, but 10 are left for it.
 TEST(FitLimits, ProbesGiveAllWhereTexelsGiveNothing) {
     PackCost cost;

@@ -199,6 +199,50 @@ TEST_F(Fit, IsWhatItsSettingsCook) {
     EXPECT_EQ(settings[fitted->fitted[0].changes[0].key]["from"], "fit");
 }
 
+// By the records of both packs, whose texels have one size: of the named set, and of no other more.
+TEST_F(Fit, NamesTheSetThatLosesMostLightAndHowMuch) {
+    const auto whole = run("", false, {}, "whole.dimmer");
+    ASSERT_TRUE(whole.has_value()) << whole.error().message;
+    const uint64_t budget = costOf(whole->pack).dynamic * 2 / 3;
+    const auto fitted = run(fmt::format(R"("budgets": {{"dynamic": {}}}, )", budget), true);
+    ASSERT_TRUE(fitted.has_value()) << fitted.error().message;
+    ASSERT_EQ(fitted->fitted.size(), 1u);
+    const auto storedLight = [](const PackData& pack) {
+        std::vector<double> of_set(pack.elements.size());
+        size_t first = 0;
+        for (const Contribution& c : pack.contributions) {
+            for (size_t i = first; i < first + c.receivers; ++i) {
+                const auto lux = decodeColor(pack.color_format, pack.payload[i].irradiance);
+                of_set[c.light_set.value()] += static_cast<double>(luminance({lux[0], lux[1], lux[2]}));
+            }
+            first += c.receivers;
+        }
+        return of_set;
+    };
+    const auto before = storedLight(whole->pack), after = storedLight(fitted->pack);
+    double most = 0;
+    std::string name;
+    for (size_t s = 0; s < before.size(); ++s)
+        if (const double lost = 1 - after[s] / before[s]; lost > most) {
+            most = lost;
+            name = fmt::format("set '{}'", whole->pack.elements[s].name);
+        }
+    const Remedy& remedy = fitted->fitted[0];
+    EXPECT_EQ(remedy.energy_of, name);
+    EXPECT_GT(remedy.energy, 0.01);
+    // Texels that charts cut at borders count in full here, by their area there: one in thirty.
+    EXPECT_NEAR(remedy.energy, most, 0.05 * most);
+    EXPECT_THAT(remedy.text(), HasSubstr(fmt::format("drops {:.2f} % of the light of {}", 100 * remedy.energy, name)));
+}
+
+// A level without sets has no set's light to lose.
+TEST(FitLimits, AlwaysOnLightIsNotSaidToBeASets) {
+    Remedy remedy;
+    remedy.energy = 0.1;
+    remedy.energy_of = "what is always on, through doors";
+    EXPECT_THAT(remedy.text(), HasSubstr("drops 10.00 % of the light of what is always on, through doors"));
+}
+
 // A set that is kept whole has no threshold to multiply.
 TEST_F(Fit, AThresholdOfNothingIsNotRaised) {
     const std::vector<std::string> set = {"records.thresholds.set0=0"};

@@ -1,0 +1,68 @@
+// Unwraps that files bring: taken whole, or piece by piece where that takes fewer texels.
+#include <bake/test_scenes.h>
+#include <charts/file_uv.h>
+#include <charts/unwrap.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace dimmer::cook::test {
+namespace {
+
+// Two squares of 1 m, one mesh, at two places of the unwrap, each 0.1 of it to a side.
+Scene twoSquares(glm::vec2 first, glm::vec2 second) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "floor", {0, 0, 0}, {0, 0, 0.5f}, {0.5f, 0, 0}, white);
+    SceneMesh other = addQuad(scene, "floor", {3, 0, 0}, {0, 0, 0.5f}, {0.5f, 0, 0}, white);
+    scene.meshes.pop_back();
+    SceneMesh& mesh = scene.meshes.back();
+    for (const glm::uvec3 t : other.triangles) mesh.triangles.push_back(t + 4u);
+    mesh.positions_m.insert(mesh.positions_m.end(), other.positions_m.begin(), other.positions_m.end());
+    mesh.normals.insert(mesh.normals.end(), other.normals.begin(), other.normals.end());
+    mesh.triangle_materials.assign(4, white);
+    for (const glm::vec2 low : {first, second})
+        for (const glm::vec2 corner : {glm::vec2(0, 0), {0.1f, 0}, {0.1f, 0.1f}, {0, 0.1f}})
+            mesh.uv1.push_back(low + corner);
+    return scene;
+}
+
+Unwrap chartsOf(const Scene& scene) {
+    const RayScene rays(scene);
+    auto charts = unwrap(rays, {.texels_per_metre = 10, .page_size = 1024});
+    EXPECT_TRUE(charts) << charts.error().message;
+    EXPECT_TRUE(charts->warnings.empty());
+    return std::move(*charts);
+}
+
+TEST(FileUv, PiecesFarApartAreChartsOfTheirOwn) {
+    const Scene scene = twoSquares({0, 0}, {0.9f, 0.9f});
+    const Unwrap charts = chartsOf(scene);
+    ASSERT_EQ(charts.charts.size(), 2u);
+    for (const auto& chart : charts.charts) {
+        EXPECT_TRUE(chart.of_file);
+        EXPECT_NEAR(chart.width, 10 + 2, 1);  // 1 m at 10 texels, and padding; rounding up
+        EXPECT_NEAR(chart.height, 10 + 2, 1);
+    }
+    EXPECT_EQ(charts.page_width, 64u);  // the least
+}
+
+// With an eighth of a square between them two charts and their padding take more than one.
+TEST(FileUv, PiecesSideBySideStayOneChart) {
+    const Unwrap charts = chartsOf(twoSquares({0.2f, 0.3f}, {0.3125f, 0.3f}));
+    ASSERT_EQ(charts.charts.size(), 1u);
+    EXPECT_NEAR(charts.charts[0].width, 21 + 2, 1);
+}
+
+TEST(FileUv, PiecesShareNoCorner) {
+    const Scene scene = twoSquares({0, 0}, {0.1f, 0.1f});  // at one corner they meet
+    const SceneMesh& mesh = scene.meshes[0];
+    using Pieces = std::vector<std::vector<uint32_t>>;
+    EXPECT_EQ(unwrapPieces(mesh, std::vector<uint32_t>{0, 1, 2, 3}), (Pieces{{0, 1, 2, 3}}));
+    const Scene apart = twoSquares({0, 0}, {0.5f, 0.1f});
+    EXPECT_EQ(unwrapPieces(apart.meshes[0], std::vector<uint32_t>{0, 2, 1, 3}), (Pieces{{0, 2}, {1, 3}}));
+    EXPECT_TRUE(unwrapPieces(mesh, {}).empty());
+}
+
+}  // namespace
+}  // namespace dimmer::cook::test
