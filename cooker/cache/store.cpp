@@ -55,7 +55,8 @@ std::optional<std::vector<std::byte>> decode(std::span<const std::byte> file, st
     if (header.magic != entry_magic || stored.size() != header.stored_bytes) return {};
     const XXH128_hash_t hash = hashOf(stored, name);
     if (hash.high64 != header.hash_high || hash.low64 != header.hash_low) return {};
-    return Decompressor().run(stored, header.real_bytes);
+    thread_local Decompressor decompressor;
+    return decompressor.run(stored, header.real_bytes);
 }
 
 std::vector<std::byte> encode(std::span<const std::byte> bytes, std::string_view name) {

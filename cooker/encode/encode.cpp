@@ -15,21 +15,35 @@ constexpr float ridge = 1e-4f;
 
 using Parameters = glm::vec3;  // r, b_x, b_y
 
-const std::array<glm::vec3, 4> tilted_normals = {
-    {{tilt_sin, 0, tilt_cos}, {0, tilt_sin, tilt_cos}, {-tilt_sin, 0, tilt_cos}, {0, -tilt_sin, tilt_cos}}};
+// Of each tilted normal.
+using Four [[gnu::vector_size(16)]] = float;
+using FourFlags [[gnu::vector_size(16)]] = int;
+constexpr Four normals_x = {tilt_sin, 0, -tilt_sin, 0}, normals_y = {0, tilt_sin, 0, -tilt_sin};
 
-struct Falloff {
-    float value;
-    Parameters slope;  // by r, b_x, b_y
-};
-
-// E(n) / E_z; see runtime/format/texel.h.
-Falloff falloff(const Parameters& p, glm::vec3 n, DirectionModel model) {
-    const float highlight = p.y * n.x + p.z * n.y + (1 - p.x) * n.z;
-    const Parameters slope(1 - n.z, n.x, n.y);
-    if (model == DirectionModel::Linear)
-        return p.x + highlight > 0 ? Falloff{p.x + highlight, slope} : Falloff{0, Parameters(0)};
-    return highlight > 0 ? Falloff{p.x + highlight, slope} : Falloff{p.x, {1, 0, 0}};
+// Gauss-Newton's step from the errors on the four normals: depends on no more than which of them are clamped.
+using Step = std::array<Parameters, 4>;
+Step stepOf(uint32_t open, DirectionModel model) {
+    glm::mat3 normal(ridge);
+    Step slopes;  // of E(n) / E_z
+    for (uint32_t i = 0; i < 4; ++i) {
+        const bool is_open = open >> i & 1;
+        slopes[i] = is_open ? Parameters(1 - tilt_cos, normals_x[i], normals_y[i])
+                            : Parameters(model == DirectionModel::Linear ? 0 : 1, 0, 0);
+        normal += glm::outerProduct(slopes[i], slopes[i]);
+    }
+    const glm::mat3 inverse = glm::inverse(normal);
+    for (Parameters& slope : slopes) slope = inverse * slope;
+    return slopes;
+}
+const Step& stepFor(uint32_t open, DirectionModel model) {
+    using Steps = std::array<Step, 16>;
+    static const std::array<Steps, 2> steps = [] {
+        std::array<Steps, 2> all;
+        for (const auto m : {DirectionModel::Ahd, DirectionModel::Linear})
+            for (uint32_t i = 0; i < 16; ++i) all[static_cast<size_t>(m)][i] = stepOf(i, m);
+        return all;
+    }();
+    return steps[static_cast<size_t>(model)][open];
 }
 
 Parameters clamped(Parameters p) {
@@ -37,32 +51,40 @@ Parameters clamped(Parameters p) {
             std::clamp(p.z, -moment_max, moment_max)};
 }
 
-float residual(const Parameters& p, glm::vec4 target, DirectionModel model) {
-    float sum = 0;
-    for (int i = 0; i < 4; ++i) {
-        const float error = falloff(p, tilted_normals[static_cast<size_t>(i)], model).value - target[i];
-        sum += error * error;
+// Of the model on the four normals.
+struct Errors {
+    Four of;
+    uint32_t open = 0;  // a bit for each normal that is not clamped
+    float square = 0;
+};
+// E(n) / E_z: see runtime/format/texel.h.
+Errors errorsOf(const Parameters& p, Four target, DirectionModel model) {
+    const Four highlight = p.y * normals_x + p.z * normals_y + (1 - p.x) * tilt_cos, sum = p.x + highlight;
+    const bool linear = model == DirectionModel::Linear;
+    const FourFlags open = (linear ? sum : highlight) > 0;
+    Errors errors;
+    errors.of = (open ? sum : Four{} + (linear ? 0 : p.x)) - target;
+    for (size_t i = 0; i < 4; ++i) {
+        errors.open |= static_cast<uint32_t>(open[i]) & 1u << i;
+        errors.square += errors.of[i] * errors.of[i];
     }
-    return sum;
+    return errors;
 }
 
 // Gauss-Newton, as long as it helps.
-Parameters refine(Parameters p, glm::vec4 target, DirectionModel model, float& best) {
-    best = residual(p, target, model);
+Parameters refine(Parameters p, Four target, DirectionModel model, float& best) {
+    Errors errors = errorsOf(p, target, model);
     for (int round = 0; round < rounds_max; ++round) {
-        glm::mat3 normal(ridge);
-        glm::vec3 gradient(0);
-        for (int i = 0; i < 4; ++i) {
-            const Falloff f = falloff(p, tilted_normals[static_cast<size_t>(i)], model);
-            normal += glm::outerProduct(f.slope, f.slope);
-            gradient += f.slope * (target[i] - f.value);
-        }
-        const Parameters next = clamped(p + glm::inverse(normal) * gradient);
-        const float now = residual(next, target, model);
-        if (!(now < best * 0.999f)) break;
+        const Step& step = stepFor(errors.open, model);
+        Parameters next = p;
+        for (size_t i = 0; i < 4; ++i) next -= step[i] * errors.of[i];
+        next = clamped(next);
+        const Errors now = errorsOf(next, target, model);
+        if (!(now.square < errors.square * 0.999f)) break;
         p = next;
-        best = now;
+        errors = now;
     }
+    best = errors.square;
     return p;
 }
 
@@ -79,7 +101,9 @@ Highlight fitHighlight(const Gathered& light, DirectionModel model) {
     const Parameters lamp = clamped({0.05f, glm::max(glm::vec2(target.x, target.y) - tilt_cos, 0.0f) / tilt_sin -
                                                 glm::max(glm::vec2(target.z, target.w) - tilt_cos, 0.0f) / tilt_sin});
     float open_residual, lamp_residual;
-    const Parameters a = refine(open, target, model, open_residual), b = refine(lamp, target, model, lamp_residual);
+    const Four on_normals = {target.x, target.y, target.z, target.w};
+    const Parameters a = refine(open, on_normals, model, open_residual),
+                     b = refine(lamp, on_normals, model, lamp_residual);
     const Parameters& best = lamp_residual < open_residual ? b : a;
     return {best.x, best.y, best.z};
 }

@@ -52,9 +52,9 @@ double squareOf(const std::array<double, 3>& v) {
     return v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
 }
 
-// Turned into the frame of A's eigenvectors, as closely as the floats of its light are known.
+// Turned into the frame of A's eigenvectors, more closely than the floats of its light are known.
 void diagonalise(Quadric& f) {
-    constexpr double enough = 1e-24;  // squared
+    constexpr double enough = 1e-18;  // squared
     const double square = squareOf(f.a[0]) + squareOf(f.a[1]) + squareOf(f.a[2]);
     for (int sweep = 0; sweep < jacobi_sweeps_max; ++sweep) {
         if (squareOf({f.a[0][1], f.a[0][2], f.a[1][2]}) <= enough * square) return;

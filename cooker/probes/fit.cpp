@@ -24,23 +24,50 @@ struct alignas(32) Lanes {
 };
 using Vector = std::vector<Lanes>;
 
+// Per probe, ascending: the sites that it counts at, and as which of their four.
+class CornersOfProbes {
+   public:
+    struct Corner {
+        uint32_t site, number;
+    };
+
+    CornersOfProbes(std::span<const FitSite> sites, size_t probes) : first_(probes + 1, 0) {
+        forEach(sites, [&](uint32_t probe, Corner) { ++first_[probe + 1]; });
+        for (size_t i = 0; i < probes; ++i) first_[i + 1] += first_[i];
+        corners_.resize(first_.back());
+        std::vector<uint32_t> next(first_.begin(), first_.end() - 1);
+        forEach(sites, [&](uint32_t probe, Corner corner) { corners_[next[probe]++] = corner; });
+    }
+    std::span<const Corner> of(uint32_t probe) const {
+        return std::span(corners_).subspan(first_[probe], first_[probe + 1] - first_[probe]);
+    }
+
+   private:
+    static void forEach(std::span<const FitSite> sites, auto&& visit) {
+        for (uint32_t s = 0; s < sites.size(); ++s)
+            for (uint32_t k = 0; k < 4; ++k)
+                if (sites[s].shares[k] > 0) visit(sites[s].probes[k], Corner{s, k});
+    }
+
+    std::vector<uint32_t> first_;  // per probe and one more, into corners_
+    std::vector<Corner> corners_;
+};
+
 // One conjugate gradient for each of the 27 right-hand sides, side by side. Of the normal equations, with their matrix
 // written out: there are several sites to a probe, and a probe has some fifteen neighbours, so that a step over rows
 // moves an eighth of the bytes of one over sites.
 class Solver {
    public:
     Solver(std::span<const FitSite> sites, std::span<const float> own, size_t probes)
-        : sites_(sites), rows_(probes), diagonal_(probes, 0) {
-        for (uint32_t i = 0; i < probes; ++i) rows_[i].add(i, 0);  // found first from now on
+        : sites_(sites), diagonal_(probes, 0) {
         std::vector<float> squares(probes, 0);
         for (const FitSite& s : sites)
             for (size_t k = 0; k < 4; ++k) {
                 if (!(s.shares[k] > 0)) continue;
-                for (size_t o = 0; o < 4; ++o)
-                    if (s.shares[o] > 0) rows_[s.probes[k]].add(s.probes[o], s.importance * s.shares[k] * s.shares[o]);
                 diagonal_[s.probes[k]] += s.importance * s.shares[k] * s.shares[k];
                 squares[s.probes[k]] += s.shares[k] * s.shares[k];
             }
+        buildRows(probes);
         prior_.assign(probes, 1);  // of what counts nowhere, and stays as it is
         for (size_t i = 0; i < probes; ++i) {
             const bool known = !own.empty() && own[i] > 0;
@@ -56,7 +83,7 @@ class Solver {
         for (size_t s = 0; s < sites_.size(); ++s) scatter(Lanes(targets[s]), sites_[s], residual);
         const Lanes enough = powerOfTargets(residual, tolerance);
         for (size_t i = 0; i < n; ++i) x[i] = Lanes(values[i]);
-        for (size_t i = 0; i < n; ++i) rows_[i].addTo(residual[i], x, -1);
+        for (size_t i = 0; i < n; ++i) addRow(i, residual[i], x, -1);
         Lanes power;
         for (size_t i = 0; i < n; ++i)
             for (size_t c = 0; c < Lanes::count; ++c) {
@@ -87,24 +114,40 @@ class Solver {
     }
 
    private:
-    // A probe's row of the matrix, without its prior.
-    struct MatrixRow {
-        std::vector<uint32_t> probes;
-        std::vector<float> weights;
-
-        void add(uint32_t probe, float weight) {
-            const auto found = std::ranges::find(probes, probe);
-            if (found != probes.end()) {
-                weights[static_cast<size_t>(found - probes.begin())] += weight;
-                return;
-            }
-            probes.push_back(probe);
-            weights.push_back(weight);
-        }
-        void addTo(Lanes& sum, const Vector& x, float sign) const {
-            for (size_t k = 0; k < probes.size(); ++k) sum.add(sign * weights[k], x[probes[k]]);
-        }
+    struct Entry {
+        uint32_t probe;
+        float weight;
     };
+
+    // Rows of the matrix, without their priors: a row at a time, so that where a neighbour's entry is can be looked up.
+    void buildRows(size_t probes) {
+        const CornersOfProbes corners(sites_, probes);
+        std::vector<uint32_t> entry_of(probes, 0);  // in the row at hand, where it is one of its
+        rows_.reserve(probes + 1);
+        for (uint32_t i = 0; i < probes; ++i) {
+            const size_t first = entries_.size();
+            rows_.push_back(first);
+            const auto add = [&](uint32_t probe, float weight) {
+                uint32_t& entry = entry_of[probe];
+                if (entry < first || entry >= entries_.size() || entries_[entry].probe != probe) {
+                    entry = static_cast<uint32_t>(entries_.size());
+                    entries_.push_back({probe, weight});
+                } else {
+                    entries_[entry].weight += weight;
+                }
+            };
+            add(i, 0);
+            for (const auto& [site, k] : corners.of(i)) {
+                const FitSite& s = sites_[site];
+                for (size_t o = 0; o < 4; ++o)
+                    if (s.shares[o] > 0) add(s.probes[o], s.importance * s.shares[k] * s.shares[o]);
+            }
+        }
+        rows_.push_back(entries_.size());
+    }
+    void addRow(size_t i, Lanes& sum, const Vector& x, float sign) const {
+        for (size_t e = rows_[i]; e < rows_[i + 1]; ++e) sum.add(sign * entries_[e].weight, x[entries_[e].probe]);
+    }
 
     // Below which a residual's power is at most `tolerance`, squared, of that of all light.
     Lanes powerOfTargets(const Vector& image, float tolerance) const {
@@ -121,13 +164,14 @@ class Solver {
         for (size_t i = 0; i < x.size(); ++i) {
             Lanes sum;
             sum.add(prior_[i], x[i]);
-            rows_[i].addTo(sum, x, 1);
+            addRow(i, sum, x, 1);
             out[i] = sum;
         }
     }
 
     std::span<const FitSite> sites_;
-    std::vector<MatrixRow> rows_;
+    std::vector<size_t> rows_;  // where each begins in entries_, and the end
+    std::vector<Entry> entries_;
     std::vector<float> diagonal_, prior_;
 };
 

@@ -14,6 +14,7 @@ namespace {
 constexpr uint32_t not_a_member = UINT32_MAX;
 // A term that is active where a probe has so large a share belongs to the probe too.
 constexpr float share_that_counts = 0.1f;
+constexpr std::ptrdiff_t lights_ahead = 8;
 constexpr float fit_tolerance = 0.01f;  // errors of interpolation are several times that
 
 // Per position, ascending: the terms of its own place and of the places that it counts at; with the light that was
@@ -109,11 +110,18 @@ class TermFit {
         return sites;
     }
 
+    // Light of one term lies a row's length apart.
+    static void prefetch(const ProbeLight* light) {
+        for (size_t byte = 0; byte < sizeof *light; byte += 64)
+            __builtin_prefetch(reinterpret_cast<const char*>(light) + byte);
+    }
+
     // Where the term is not active it is as good as dark.
     void chooseSites(std::span<const ProbeTerm> members) {
         auto lit = light_.begin();
         for (const uint32_t s : sitesOf(members)) {
-            while (lit != light_.end() && lit->place < s) ++lit;
+            for (; lit != light_.end() && lit->place < s; ++lit)
+                if (light_.end() - lit > lights_ahead) prefetch(lit[lights_ahead].light);
             FitSite site = placed_.sites[s];
             float known = 0;
             for (size_t k = 0; k < 4; ++k) {

@@ -1,6 +1,7 @@
 #include <probes/obstacles.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -14,10 +15,13 @@ constexpr float never = std::numeric_limits<float>::infinity();
 
 using Mask [[gnu::vector_size(32)]] = int;
 
-bool anyOf(const Mask& mask) {
+// A bit per lane.
+uint32_t lanesOf(const Mask& mask) {
+    const Mask bits = mask & Mask{1, 2, 4, 8, 16, 32, 64, 128};
     uint64_t words[4];
-    std::memcpy(words, &mask, sizeof words);
-    return (words[0] | words[1] | words[2] | words[3]) != 0;
+    std::memcpy(words, &bits, sizeof words);
+    const uint64_t both = words[0] | words[1] | words[2] | words[3];
+    return static_cast<uint32_t>(both | both >> 32);
 }
 
 }  // namespace
@@ -35,20 +39,40 @@ Obstacles::Obstacles(const RayScene& rays, const TriangleCells* cells, const std
     prepare(near);
 }
 
+// Whether no way between points of the tetrahedron can meet the triangle: all corners lie on one side of its plane, or,
+// seen along its normal, beyond one of its sides.
+bool Obstacles::isClear(const Barycentric& distance, const Barycentric& second, const Barycentric& third) {
+    size_t above = 0, beyond_second = 0, beyond_third = 0, beyond_first = 0;
+    for (size_t i = 0; i < 4; ++i) {
+        above += distance[i] > 0;
+        beyond_second += second[i] < -edge_tolerance;
+        beyond_third += third[i] < -edge_tolerance;
+        beyond_first += second[i] + third[i] > 1 + edge_tolerance;
+    }
+    return above == 0 || above == 4 || beyond_second == 4 || beyond_third == 4 || beyond_first == 4;
+}
+
 void Obstacles::prepare(const std::vector<uint32_t>& near) {
     for (const uint32_t t : near) {
         const glm::vec3 a = rays_.corner(t, 0), to_b = rays_.corner(t, 1) - a, to_c = rays_.corner(t, 2) - a;
         const glm::vec3 normal = glm::cross(to_b, to_c);
         const float square = glm::dot(normal, normal);
         if (!(square > 0)) continue;
+        Barycentric distance, second, third;
+        for (size_t i = 0; i < 4; ++i) {
+            const glm::vec3 p = corners_[i] - a;
+            distance[i] = glm::dot(rays_.triangles()[t].normal, p);
+            second[i] = glm::dot(glm::cross(p, to_c), normal) / square;
+            third[i] = glm::dot(glm::cross(to_b, p), normal) / square;
+        }
+        if (isClear(distance, second, third)) continue;
         const size_t g = count_ / lanes, lane = count_ % lanes;
         if (lane == 0)  // the rest of the group is what nothing meets: all lies on one side of it
             for (size_t i = 0; i < 4; ++i) distance_[i][g] = second_[i][g] = third_[i][g] = Lanes{} + 1;
         for (size_t i = 0; i < 4; ++i) {
-            const glm::vec3 p = corners_[i] - a;
-            distance_[i][g][lane] = glm::dot(rays_.triangles()[t].normal, p);
-            second_[i][g][lane] = glm::dot(glm::cross(p, to_c), normal) / square;
-            third_[i][g][lane] = glm::dot(glm::cross(to_b, p), normal) / square;
+            distance_[i][g][lane] = distance[i];
+            second_[i][g][lane] = second[i];
+            third_[i][g][lane] = third[i];
         }
         triangles_[count_++] = t;
     }
@@ -83,10 +107,9 @@ std::array<Obstacle, 4> Obstacles::from(const Barycentric& point, const std::arr
             const Lanes c = third[g] + on_way * (third_[v][g] - third[g]);
             const Mask hit = ((distance[g] > 0) ^ (end > 0)) & (b >= -edge_tolerance) & (c >= -edge_tolerance) &
                              (b + c <= 1 + edge_tolerance);
-            if (!anyOf(hit)) continue;
-            out[v].any = true;
-            for (size_t lane = 0; lane < lanes; ++lane) {
-                if (!hit[lane]) continue;
+            for (uint32_t left = lanesOf(hit); left != 0; left &= left - 1) {
+                const auto lane = static_cast<size_t>(std::countr_zero(left));
+                out[v].any = true;
                 if (on_way[lane] < nearest) {
                     nearest = on_way[lane];
                     out[v].first = triangles_[g * lanes + lane];

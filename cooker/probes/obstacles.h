@@ -40,6 +40,7 @@ class Obstacles {
     // Something that is linear over the tetrahedron, by its values at the corners: of each triangle.
     using Fields = std::array<std::array<Lanes, triangles_max / lanes>, 4>;
     void prepare(const std::vector<uint32_t>& near);
+    static bool isClear(const Barycentric& distance, const Barycentric& second, const Barycentric& third);
     Obstacle byRays(glm::vec3 from, size_t corner) const;
 
     const RayScene& rays_;

@@ -71,20 +71,35 @@ std::array<Weights, corner_samples> pointsAtCorners() {
     return points;
 }
 
+// One worker's scratch, for one tetrahedron after another.
 class Table {
    public:
-    Table(const RayScene& rays, const Obstacles& obstacles, const std::array<bool, 4>& free,
-          std::span<const Weights> places, uint32_t points)
-        : rays_(rays), obstacles_(obstacles), free_(free) {
+    TetrahedronVisibility find(const RayScene& rays, const Obstacles& obstacles, const std::array<bool, 4>& free,
+                               std::span<const Weights> places, uint32_t points) {
+        clear();
+        rays_ = &rays;
+        obstacles_ = &obstacles;
+        free_ = free;
         for (const Weights& w : pointsAtCorners()) look(w);
         for (uint32_t i = 0; i < tries_per_sample * points && points_.size() - at_surfaces_ < corner_samples + points;
              ++i)
             look(pointInside(sequence3d(i, 1)));
         const size_t step = places.size() / points + 1;
         for (size_t i = 0; i < places.size(); i += step) look(places[i]);
+        return findHere();
     }
 
-    TetrahedronVisibility find() {
+   private:
+    void clear() {
+        points_.clear();
+        buried_.clear();
+        at_surfaces_ = 0;
+        planes_.clear();
+        numbers_.clear();
+        for (auto& rows : rows_) rows.clear();
+    }
+
+    TetrahedronVisibility findHere() {
         TetrahedronVisibility out;
         lendUnseen();
         findRows();
@@ -96,7 +111,6 @@ class Table {
         return out;
     }
 
-   private:
     struct Point {
         Weights at;
         std::array<bool, 4> seen = {};
@@ -109,14 +123,14 @@ class Table {
     void look(const Weights& w, bool surfaces = true) {
         Point point{w};
         uint32_t hidden = 0, backs = 0;
-        const auto found = obstacles_.from(w, free_);
+        const auto found = obstacles_->from(w, free_);
         for (size_t v = 0; v < 4; ++v) {
             if (!free_[v]) continue;
             point.seen[v] = !found[v].any;
             if (point.seen[v]) continue;
             ++hidden;
-            const auto& first = rays_.triangles()[found[v].first];
-            backs += found[v].back && !rays_.scene().materials[first.material].double_sided;
+            const auto& first = rays_->triangles()[found[v].first];
+            backs += found[v].back && !rays_->scene().materials[first.material].double_sided;
             point.plane[v] = numberOf(found[v].first);
             if (found[v].last != found[v].first) numberOf(found[v].last);
         }
@@ -148,7 +162,7 @@ class Table {
         return numbers_.back().second;
     }
     uint32_t findNumber(uint32_t triangle) {
-        const Weights field = obstacles_.field(triangle);
+        const Weights field = obstacles_->field(triangle);
         const auto same = [&](const Weights& other) {
             for (size_t k = 0; k < 4; ++k)
                 if (std::abs(other[k] - field[k]) > same_plane_m) return false;
@@ -261,9 +275,9 @@ class Table {
         std::array<IntLanes, 4> seen{}, miss{};  // seen: all bits or none
     };
 
-    const RayScene& rays_;
-    const Obstacles& obstacles_;
-    const std::array<bool, 4> free_;
+    const RayScene* rays_ = nullptr;
+    const Obstacles* obstacles_ = nullptr;
+    std::array<bool, 4> free_ = {};
     std::vector<Point> points_, buried_;
     size_t at_surfaces_ = 0;  // of points_
     std::vector<Group> points_grouped_, buried_grouped_;
@@ -278,7 +292,10 @@ TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm:
                                      const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places,
                                      const TriangleCells* cells, uint32_t points) {
     const Obstacles obstacles(rays, cells, corners);
-    if (!obstacles.none()) return Table(rays, obstacles, free, places, points).find();
+    if (!obstacles.none()) {
+        thread_local Table table;
+        return table.find(rays, obstacles, free, places, points);
+    }
     TetrahedronVisibility out;
     for (size_t v = 0; v < 4; ++v) out.seen[v] = free[v] ? seen_everywhere : seen_nowhere;
     return out;

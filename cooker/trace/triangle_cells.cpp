@@ -110,13 +110,15 @@ bool TriangleCells::findNear(const std::array<glm::vec3, 4>& corners, std::vecto
     if (span.x * span.y * span.z > cells_per_query_max) return false;
     const std::array<Plane, 4> sides = sidesOf(corners);
     const glm::vec3 half(0.5f * cell_m_ + margin_m);
+    std::array<Plane, 4> farthest = sides;  // of the centres of cells that reach into it
+    for (Plane& side : farthest) side.offset += side.reach(half);
     for (int z = low.z; z <= high.z; ++z)
         for (int y = low.y; y <= high.y; ++y)
             for (int x = low.x; x <= high.x; ++x) {
                 const size_t cell = index({x, y, z});
                 if (first_[cell] == first_[cell + 1]) continue;
                 const glm::vec3 centre = origin_ + (glm::vec3(x, y, z) + 0.5f) * cell_m_;
-                if (isBeyond(sides, [&](const Plane& s) { return s.distance(centre) > s.reach(half); })) continue;
+                if (isBeyond(farthest, [&](const Plane& s) { return s.distance(centre) > 0; })) continue;
                 for (uint32_t i = first_[cell]; i < first_[cell + 1]; ++i)
                     if (const uint32_t t = triangles_[i];
                         std::exchange(met[t], query) != query && reaches(rays_, t, corners, sides))
