@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 namespace dimmer::cook {
 namespace {
@@ -73,35 +74,15 @@ bool surelyPositive(const ProbeLight& light, int channel) {
     return f.c + mean - std::sqrt(squareOf(f.b)) - std::sqrt(std::max(0.0, square) * 2 / 3) > 0;
 }
 
-bool negativeSomewhere(const ProbeLight& light) {
-    for (int channel = 0; channel < 3; ++channel)
-        if (!surelyPositive(light, channel) && leastIrradiance(light, channel) < 0) return true;
-    return false;
-}
-
-ProbeRecord encodePlain(const ProbeLight& light, const ProbeEncoding& encoding) {
-    const glm::vec3 dc = glm::max(light.radiance[0], 0.0f) * encoding.exposure;
-    ProbeRecord record{.light = encodeColor(encoding.color_format, dc.x, dc.y, dc.z), .bands = {}};
-    const auto stored = decodeColor(encoding.color_format, record.light);
-    std::array<int8_t, probe_codes> codes{};
-    for (size_t i = 1; i < sh_count; ++i)
-        for (int c = 0; c < 3; ++c) {
-            const float bound = stored[static_cast<size_t>(c)] * band_bounds[bandOf(i)];
-            if (!(bound > 0)) continue;
-            const float q = std::round(127 * light.radiance[i][c] * encoding.exposure / bound);
-            codes[3 * (i - 1) + static_cast<size_t>(c)] = static_cast<int8_t>(std::clamp(q, -127.0f, 127.0f));
-        }
-    record.bands = std::bit_cast<std::array<uint32_t, probe_words>>(codes);
-    return record;
-}
-
-}  // namespace
-
 // A quadratic on the unit sphere has no gap to its dual: the least of b.n + n.A n is the largest of
 // l - sum b_i^2 / (4 (a_i - l)) over l up to the least eigenvalue, in the frame of the eigenvectors, and lies where
 // n_i = b_i / (2 (l - a_i)) has length 1 (More and Sorensen 1983). 1 / length is concave in l, so that Newton's method
 // comes down to the root from above after one step.
-float leastIrradiance(const ProbeLight& light, int channel) {
+struct Lowest {
+    float irradiance;  // lux
+    double l;
+};
+Lowest lowestOf(const ProbeLight& light, int channel) {
     Quadric f = quadricOf(light, channel);
     diagonalise(f);
     const std::array<double, 3> a = {f.a[0][0], f.a[1][1], f.a[2][2]};
@@ -130,7 +111,82 @@ float leastIrradiance(const ProbeLight& light, int channel) {
     double least = f.c + l;
     for (size_t i = 0; i < 3; ++i)
         if (f.b[i] != 0 && a[i] > l) least -= f.b[i] * f.b[i] / (4 * (a[i] - l));
-    return static_cast<float>(least);
+    return {static_cast<float>(least), l};
+}
+
+// Whether the least is below 0, where some l shows it: with A - l positive definite, it is at least
+// c + l - b.(A - l)^-1 b / 4, and at most the irradiance on the normal along -(A - l)^-1 b. Both are close where l is
+// about what lowestOf() ends at.
+std::optional<bool> isNegativeBy(const Quadric& f, double l) {
+    // A - l = L D L^T.
+    const double d0 = f.a[0][0] - l, l10 = f.a[1][0] / d0, l20 = f.a[2][0] / d0;
+    const double d1 = f.a[1][1] - l - l10 * f.a[1][0], l21 = (f.a[2][1] - l20 * f.a[1][0]) / d1;
+    const double d2 = f.a[2][2] - l - l20 * f.a[2][0] - l21 * l21 * d1;
+    if (!(d0 > 0 && d1 > 0 && d2 > 0)) return {};
+    const double y0 = f.b[0], y1 = f.b[1] - l10 * y0, y2 = f.b[2] - l20 * y0 - l21 * y1;
+    const double x2 = y2 / d2, x1 = y1 / d1 - l21 * x2, x0 = y0 / d0 - l10 * x1 - l20 * x2;
+    if (f.c + l - (f.b[0] * x0 + f.b[1] * x1 + f.b[2] * x2) / 4 > 0) return false;
+    const std::array<double, 3> n = {-x0, -x1, -x2};
+    const double square = squareOf(n), length = std::sqrt(square);
+    double linear = 0, quadratic = 0;
+    for (size_t i = 0; i < 3; ++i) {
+        linear += f.b[i] * n[i];
+        for (size_t k = 0; k < 3; ++k) quadratic += n[i] * f.a[i][k] * n[k];
+    }
+    if (square > 0 && f.c + linear / length + quadratic / square < 0) return true;
+    return {};
+}
+
+// The largest share, 0 to 1, that leaves no channel negative, and per channel the l of its least irradiance: 0 where
+// that was not looked for.
+struct PositiveShare {
+    float share = 1;
+    std::array<double, 3> l{};
+};
+PositiveShare findPositiveShare(const ProbeLight& light) {
+    PositiveShare out;
+    for (int channel = 0; channel < 3; ++channel) {
+        if (surelyPositive(light, channel)) continue;
+        const float mean = light.irradiance()[channel];
+        const Lowest lowest = lowestOf(light, channel);
+        out.l[static_cast<size_t>(channel)] = lowest.l;
+        if (lowest.irradiance < 0) out.share = std::min(out.share, mean / (mean - lowest.irradiance));
+    }
+    out.share = std::max(out.share, 0.0f);
+    return out;
+}
+
+// `light`: what about this share of the bands became.
+bool negativeSomewhere(const ProbeLight& light, const PositiveShare& of) {
+    for (int channel = 0; channel < 3; ++channel) {
+        if (surelyPositive(light, channel)) continue;
+        const double l = static_cast<double>(of.share) * of.l[static_cast<size_t>(channel)];
+        const auto known = isNegativeBy(quadricOf(light, channel), l);
+        if (known ? *known : leastIrradiance(light, channel) < 0) return true;
+    }
+    return false;
+}
+
+ProbeRecord encodePlain(const ProbeLight& light, const ProbeEncoding& encoding) {
+    const glm::vec3 dc = glm::max(light.radiance[0], 0.0f) * encoding.exposure;
+    ProbeRecord record{.light = encodeColor(encoding.color_format, dc.x, dc.y, dc.z), .bands = {}};
+    const auto stored = decodeColor(encoding.color_format, record.light);
+    std::array<int8_t, probe_codes> codes{};
+    for (size_t i = 1; i < sh_count; ++i)
+        for (int c = 0; c < 3; ++c) {
+            const float bound = stored[static_cast<size_t>(c)] * band_bounds[bandOf(i)];
+            if (!(bound > 0)) continue;
+            const float q = std::round(127 * light.radiance[i][c] * encoding.exposure / bound);
+            codes[3 * (i - 1) + static_cast<size_t>(c)] = static_cast<int8_t>(std::clamp(q, -127.0f, 127.0f));
+        }
+    record.bands = std::bit_cast<std::array<uint32_t, probe_words>>(codes);
+    return record;
+}
+
+}  // namespace
+
+float leastIrradiance(const ProbeLight& light, int channel) {
+    return lowestOf(light, channel).irradiance;
 }
 
 ProbeLight flattened(const ProbeLight& light, float share) {
@@ -140,13 +196,7 @@ ProbeLight flattened(const ProbeLight& light, float share) {
 }
 
 float positiveShare(const ProbeLight& light) {
-    float share = 1;
-    for (int channel = 0; channel < 3; ++channel) {
-        if (surelyPositive(light, channel)) continue;
-        const float mean = light.irradiance()[channel], least = leastIrradiance(light, channel);
-        if (least < 0) share = std::min(share, mean / (mean - least));
-    }
-    return std::max(share, 0.0f);
+    return findPositiveShare(light).share;
 }
 
 ProbeLight decodeProbe(const ProbeRecord& record, const ProbeEncoding& encoding) {
@@ -164,11 +214,11 @@ ProbeLight decodeProbe(const ProbeRecord& record, const ProbeEncoding& encoding)
 }
 
 ProbeRecord encodeProbe(const ProbeLight& light, const ProbeEncoding& encoding) {
-    float share = positiveShare(light);
-    ProbeRecord record = encodePlain(flattened(light, share), encoding);
-    for (int i = 0; i < retreats_max && negativeSomewhere(decodeProbe(record, encoding)); ++i) {
-        share = i + 1 < retreats_max ? share * retreat : 0;
-        record = encodePlain(flattened(light, share), encoding);
+    PositiveShare of = findPositiveShare(light);
+    ProbeRecord record = encodePlain(flattened(light, of.share), encoding);
+    for (int i = 0; i < retreats_max && negativeSomewhere(decodeProbe(record, encoding), of); ++i) {
+        of.share = i + 1 < retreats_max ? of.share * retreat : 0;
+        record = encodePlain(flattened(light, of.share), encoding);
     }
     return record;
 }

@@ -48,7 +48,7 @@ struct CookStats {
 };
 
 // Bakes a scene that is already in memory. Deterministic: the same scene and settings give the same data, whatever the
-// cache has. `losses`: takes what raising thresholds would do.
+// cache has. `losses`: takes what raising thresholds would do, where the pack is over a budget of the profile.
 Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::string& quality, Progress& progress,
                              CookStats& stats, CookCache* cache = nullptr, LossTable* losses = nullptr);
 

@@ -8,6 +8,7 @@
 #include <bake/sampling.h>
 #include <charts/texels.h>
 #include <models/self_visibility.h>
+#include <pipeline/budget.h>
 #include <pipeline/charted_level.h>
 #include <pipeline/cook_settings.h>
 #include <pipeline/cook_warnings.h>
@@ -125,6 +126,12 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
                                              "check the winding of the level's triangles");
     if (auto ok = checkTerms(level); !ok) return std::unexpected(ok.error());
     Baked baked;
+    // Where receivers are limited this is known before the limit alone: what that drops comes back where higher
+    // thresholds make room.
+    const auto findLosses = [&] {
+        return LossTable(baked, at.texels, settings.group_thresholds, profile.overlap_max,
+                         chartSizes(*level.rays, level.charts, profile.page_size));
+    };
     {
         const Stopwatch watch(stats.seconds["bake"]);
         BakeSettings of_parts = settings;
@@ -133,10 +140,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         baked = bakeWithCache(at, of_parts, timer, cache);
         multiplyByScales(level.scales, baked);
         putTogether(lamps, level.scales, level.scene, baked);
-        // Before the limit: what it drops comes back where higher thresholds make room.
-        if (losses)
-            *losses = LossTable(baked, at.texels, settings.group_thresholds, profile.overlap_max,
-                                chartSizes(*level.rays, level.charts, profile.page_size));
+        if (losses && profile.overlap_max > 0) *losses = findLosses();
         limitOverlap(baked, at.texels.area_m2, profile.overlap_max);
     }
     stats.rays += baked.rays;
@@ -150,6 +154,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         pack = encodePack(level, at.texels, baked, profile, quality_name, stats);
         progress.advance(1);
     }
+    if (losses && profile.overlap_max == 0 && !checkBudgets(pack, costOf(pack), profile)) *losses = findLosses();
     progress.finish();
     return pack;
 }
