@@ -99,6 +99,8 @@ std::string_view nearestName(std::string_view name, const std::vector<std::strin
     size_t best = std::max<size_t>(2, name.size() / 3) + 1;
     std::string_view nearest;
     for (std::string_view candidate : names) {
+        // No fewer edits than letters that one has more.
+        if (name.size() + best <= candidate.size() || candidate.size() + best <= name.size()) continue;
         const size_t distance = editDistance(name, candidate);
         if (distance >= best) continue;
         best = distance;
