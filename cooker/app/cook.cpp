@@ -152,10 +152,19 @@ Expected<void> checkArguments(const CookArguments& a) {
     for (auto above = cache.parent_path(); !above.empty() && !std::filesystem::exists(above, ignored);
          above = above.parent_path())
         inputs.push_back({"--cache", above, true});
-    return checkFiles(inputs, {{"--output", a.options.pack},
-                               printed("--json", a.json),
-                               {"--write-level", a.write_level},
-                               {"--report", a.report}});
+    if (auto ok = checkFiles(inputs, {{"--output", a.options.pack},
+                                      printed("--json", a.json),
+                                      {"--write-level", a.write_level},
+                                      {"--report", a.report}});
+        !ok)
+        return ok;
+    if (std::filesystem::path(a.write_level).extension() == ".gltf")
+        return fail(
+            ErrorCode::InvalidArgument,
+            fmt::format("--write-level: '{}' would be read as text, and binary glTF is written; end the name in "
+                        ".glb",
+                        a.write_level));
+    return {};
 }
 
 void sayWarnings(std::span<const std::string> warnings) {

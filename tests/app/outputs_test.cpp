@@ -154,6 +154,13 @@ TEST_F(Outputs, OtherNamesOfTheSameFile) {
     expectSameFile({"export", file("linked.dimmer"), file("light")}, "a file of DIR", "PACK");
 }
 
+// Binary glTF under the name of a text is read by nothing that goes by names.
+TEST_F(Outputs, AWrittenLevelIsNamedAsWhatItIs) {
+    expectRefusedAtOnce({"cook", level(), "-o", file("other.dimmer"), "--write-level", file("final.gltf")},
+                        {"--write-level: '" + file("final.gltf") + "'", "end the name in .glb"});
+    EXPECT_FALSE(std::filesystem::exists(file("other.dimmer")));
+}
+
 // A pack or a page is nothing to print, and a file of that name is hard to be rid of.
 TEST_F(Outputs, AMinusIsNoFile) {
     const auto expectRefused = [](const std::vector<std::string>& arguments, const std::string& role,
