@@ -121,6 +121,23 @@ inline PunctualLight& addPointLight(Scene& scene, glm::vec3 position_m, float ca
     return scene.lights.back();
 }
 
+// A corridor of four rooms of 2 m in a row along x, parted by doors that fill it from wall to wall; two light sets and
+// a little always-on light.
+inline Scene corridorWithDoors() {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f)), leaf = addMaterial(scene, lambert(0.8f));
+    const uint32_t glow = addMaterial(scene, emissive(glm::vec3(30)));
+    addBox(scene, {4, 1, 1}, white);
+    scene.doors = {{"a", false}, {"b", false}, {"c", false}};
+    for (uint32_t d = 0; d < 3; ++d)
+        addSolid(scene, "leaf", {-2 + 2 * static_cast<float>(d), 0, 0}, {0.1f, 1, 1}, leaf, d);
+    scene.light_sets = {{"first", 1}, {"third", 1}};
+    addPointLight(scene, {-3, 0.2f, 0.1f}, 100, BakeMode::Full).light_set = 0;
+    addPointLight(scene, {1, -0.2f, 0.3f}, 100, BakeMode::Indirect).light_set = 1;
+    addQuad(scene, "panel", {3, 0.95f, 0}, {0.3f, 0, 0}, {0, 0, 0.3f}, glow);
+    return scene;
+}
+
 // Share of the hemisphere over a point (cosine-weighted) that a rectangle a x b fills which stands parallel at distance
 // c, one corner straight above the point (J. R. Howell, A Catalog of Radiation Heat Transfer Configuration Factors,
 // B-3).
