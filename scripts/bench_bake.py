@@ -129,8 +129,10 @@ def given_openings(level, pack, folder):
             dimmer("sample", pack, "--points", TRUTH / f"{level}.opening_{i}.points.csv", "--state", state, "-o", out)
             ours[name], truth[name] = read(out), read(TRUTH / f"{level}.opening_{i}.{name}.csv")
         error, bias, noise, n = effect_error(minus(ours["open"], ours["closed"]), minus(truth["open"], truth["closed"]))
-        there = [(v, t) for (v, _), (t, _) in zip(ours["open"], truth["open"]) if not math.isnan(v)]
-        light = sum(abs(v - t) for v, t in there) / sum(t for _, t in there)
+        there = [(v, t, s) for (v, _), (t, s) in zip(ours["open"], truth["open"]) if not math.isnan(v)]
+        all_light = sum(t for _, t, _ in there)
+        light = without(sum(abs(v - t) for v, t, _ in there) / all_light,
+                        NORMAL_MEAN * sum(s for _, _, s in there) / all_light)
         yield [level, opening["door"], percent(error), f"{100 * bias:+.2f} %", percent(noise), str(n), percent(light)]
 
 
