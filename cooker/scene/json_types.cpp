@@ -138,7 +138,7 @@ class TypeChecker {
         });
         forEach("bufferViews", "buffer view", of_view);
         forEach("textures", "texture", of_texture);
-        forEach("images", "image", of_image);
+        forEach("images", "image", of_image, [&](const json& image, const std::string& owner) { view(image, owner); });
         forEach("meshes", "mesh", {}, [&](const json& mesh, const std::string& owner) {
             if (const auto primitives = mesh.find("primitives"); primitives != mesh.end() && primitives->is_array())
                 for (const json& p : *primitives) object(p, owner, of_primitive);
@@ -192,6 +192,26 @@ class TypeChecker {
     }
     void forEach(const char* list, const char* what, std::span<const Rule> rules, auto&&... more) {
         forEach(root_, list, what, rules, more...);
+    }
+    // Null where there is none.
+    const json* itemOf(const char* list, const json* index) const {
+        const json* items = memberOf(&root_, list);
+        if (!items || !items->is_array() || !index || !isWhole(*index)) return nullptr;
+        const auto i = index->get<uint64_t>();
+        return i < items->size() ? &(*items)[i] : nullptr;
+    }
+    // The parser points at the first byte of an image's view before anybody can look whether the buffer has it.
+    void view(const json& image, const std::string& owner) {
+        const json* view = itemOf("bufferViews", memberOf(&image, "bufferView"));
+        const json* buffer = itemOf("buffers", memberOf(view, "buffer"));
+        if (!buffer || !problem_.empty()) return;
+        const auto whole = [](const json* v) { return v && isWhole(*v) ? v->get<uint64_t>() : 0; };
+        const uint64_t begin = whole(memberOf(view, "byteOffset")), size = whole(memberOf(buffer, "byteLength"));
+        if (begin >= size)
+            problem_ = fmt::format(
+                "{}: {}: its buffer view begins at byte {}, past the end of its buffer ({} bytes). "
+                "Export the level again.",
+                file_, owner, begin, size);
     }
     // Of extras and extensions what the cooker reads: the parser cuts whole numbers to 32 bits.
     void intsBeside(const json& item, const std::string& owner) {

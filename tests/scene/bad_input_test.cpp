@@ -256,6 +256,12 @@ TEST(SceneBadInput, AccessorsBeyondTheirBytes) {
     static constexpr uint64_t huge = std::numeric_limits<uint64_t>::max();
     const Fault faults[] = {
         {"view too long", [](json& d) { d["bufferViews"][0]["byteLength"] = 1 << 20; }, {"buffer view 0"}},
+        {"image's view",
+         [](json& d) {
+             d["images"] = json::array({{{"bufferView", 0}, {"mimeType", "image/png"}}});
+             d["bufferViews"][0]["byteOffset"] = 1 << 20;
+         },
+         {"image 0", "begins at byte 1048576", "past the end"}},
         {"view offset wraps", [](json& d) { d["bufferViews"][0]["byteOffset"] = huge - 8; }, {"buffer view 0"}},
         {"count", [](json& d) { d["accessors"][1]["count"] = 5; }, {"node 'floor'", "NORMAL", "do not fit"}},
         {"count 4e9", [](json& d) { d["accessors"][1]["count"] = 4000000000u; }, {"node 'floor'", "NORMAL"}},
