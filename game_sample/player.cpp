@@ -9,10 +9,10 @@
 #include "timeline.h"
 
 #include <fmt/format.h>
-#include <gpu/headless_device.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 #include <pack/pack_data.h>
+#include <tools/headless_device.h>
 
 #include <optional>
 

@@ -7,10 +7,10 @@
 #include <dimmer/runtime.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <gpu/copy_roof.h>
-#include <gpu/headless_device.h>
 #include <pack/pack_data.h>
 #include <probes/model_slots.h>
+#include <tools/copy_roof.h>
+#include <tools/headless_device.h>
 #include <write/pack_writer.h>
 
 #include <algorithm>

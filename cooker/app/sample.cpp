@@ -3,9 +3,9 @@
 #include <app/say.h>
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
-#include <gpu/headless_device.h>
 #include <pack/pack_data.h>
 #include <pipeline/sample_points.h>
+#include <tools/headless_device.h>
 
 #include <fmt/format.h>
 

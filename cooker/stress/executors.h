@@ -1,8 +1,8 @@
 // The runtimes of a stress run, driven alike.
 #pragma once
 
-#include <gpu/headless_device.h>
 #include <stress/script.h>
+#include <tools/headless_device.h>
 
 #include <memory>
 #include <string>

@@ -3,7 +3,7 @@
 #pragma once
 
 #include <bake/progress.h>
-#include <gpu/headless_device.h>
+#include <tools/headless_device.h>
 
 #include <string>
 #include <vector>

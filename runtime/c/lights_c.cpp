@@ -34,6 +34,22 @@ dimmer_result copyPages(std::span<const uint32_t> irradiance, std::span<const ui
     return DIMMER_OK;
 }
 
+dimmer_result noSuchSet(const char* of_what, uint32_t set, uint32_t count) {
+    return report(
+        {ErrorCode::NotFound, fmt::format("there is no set of {} {}; sets are 0 to {}", of_what, set, count - 1)});
+}
+
+dimmer_images imagesOf(const LightmapImages& from) {
+    return {.irradiance = from.irradiance,
+            .irradiance_view = from.irradiance_view,
+            .direction = from.direction,
+            .direction_view = from.direction_view,
+            .sampler = from.sampler,
+            .width = from.width,
+            .height = from.height,
+            .layers = from.layers};
+}
+
 }  // namespace
 }  // namespace dimmer::c
 
@@ -54,8 +70,7 @@ dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_
 }
 
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
-                                          dimmer_buffering buffering, uint32_t moving_probes_max,
-                                          dimmer_lights** lights) {
+                                          const dimmer_vulkan_options* options, dimmer_lights** lights) {
     if (!given(pack, vulkan, lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         const VulkanContext context{.instance = vulkan->instance,
@@ -65,15 +80,18 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
                                     .queue_family = vulkan->queue_family,
                                     .compute_queue = vulkan->compute_queue,
                                     .compute_queue_family = vulkan->compute_queue_family,
-                                    .get_instance_proc_addr = vulkan->get_instance_proc_addr};
-        if (buffering != DIMMER_IN_PLACE && buffering != DIMMER_DOUBLE_BUFFERED)
+                                    .get_instance_proc_addr = vulkan->get_instance_proc_addr,
+                                    .pipeline_cache = vulkan->pipeline_cache};
+        const dimmer_vulkan_options asked = options ? *options : dimmer_vulkan_options{};
+        if (asked.buffering != DIMMER_IN_PLACE && asked.buffering != DIMMER_DOUBLE_BUFFERED)
             return report({ErrorCode::InvalidArgument,
                            fmt::format("{} is no dimmer_buffering; it is DIMMER_IN_PLACE or DIMMER_DOUBLE_BUFFERED",
-                                       static_cast<int>(buffering))});
-        RuntimeOptions options;
-        options.buffering = buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace;
-        options.moving_probes_max = moving_probes_max;
-        auto created = Runtime::create(context, pack->pack, options);
+                                       static_cast<int>(asked.buffering))});
+        auto created = Runtime::create(
+            context, pack->pack,
+            {.buffering = asked.buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace,
+             .frames_in_flight = asked.frames_in_flight == 0 ? 1 : asked.frames_in_flight,
+             .moving_probes_max = asked.moving_probes_max});
         if (!created) return report(created.error());
         *lights = new dimmer_lights{std::move(*created)};
         return DIMMER_OK;
@@ -101,6 +119,14 @@ dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float
 dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state) {
     if (!given(lights, state)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] { return finish(lights->state().apply(state)); });
+}
+
+dimmer_result dimmer_lights_set_limits(dimmer_lights* lights, uint32_t receivers_max, float tolerance_quanta) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        return finish(
+            lights->state().setLimits({.receivers_max = receivers_max, .tolerance_quanta = tolerance_quanta}));
+    });
 }
 
 dimmer_result dimmer_lights_get_weight(const dimmer_lights* lights, uint32_t element, float rgb[3]) {
@@ -166,7 +192,17 @@ dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights) {
     return guarded([&] {
         auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
-        runtime->discardRecorded();
+        if (runtime->discardRecorded()) return DIMMER_OK;
+        return report({ErrorCode::NotFound, "there is no recording that could be taken back"});
+    });
+}
+
+dimmer_result dimmer_lights_invalidate(dimmer_lights* lights) {
+    if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        auto* runtime = runtimeAs<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        runtime->invalidate();
         return DIMMER_OK;
     });
 }
@@ -208,15 +244,40 @@ dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_image
     return guarded([&] {
         const auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
-        const LightmapImages from = runtime->images();
-        *images = {.irradiance = from.irradiance,
-                   .irradiance_view = from.irradiance_view,
-                   .direction = from.direction,
-                   .direction_view = from.direction_view,
-                   .sampler = from.sampler,
-                   .width = from.width,
-                   .height = from.height,
-                   .layers = from.layers};
+        *images = imagesOf(runtime->images());
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_get_sets(const dimmer_lights* lights, uint32_t* page_set, uint32_t* probe_set) {
+    if (!given(lights, page_set, probe_set)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = runtimeAs<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        *page_set = runtime->pageSet();
+        *probe_set = runtime->probeSet();
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_get_images_of_set(const dimmer_lights* lights, uint32_t page_set, dimmer_images* images) {
+    if (!given(lights, images)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = runtimeAs<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        if (page_set >= runtime->setCount()) return noSuchSet("pages", page_set, runtime->setCount());
+        *images = imagesOf(runtime->images(page_set));
+        return DIMMER_OK;
+    });
+}
+
+dimmer_result dimmer_lights_get_probes_of_set(const dimmer_lights* lights, uint32_t probe_set, VkBuffer* probes) {
+    if (!given(lights, probes)) return DIMMER_INVALID_ARGUMENT;
+    return guarded([&] {
+        const auto* runtime = runtimeAs<Runtime>(lights);
+        if (!runtime) return DIMMER_UNSUPPORTED;
+        if (probe_set >= runtime->setCount()) return noSuchSet("probes", probe_set, runtime->setCount());
+        *probes = runtime->probes(probe_set);
         return DIMMER_OK;
     });
 }

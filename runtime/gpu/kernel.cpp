@@ -44,13 +44,13 @@ Expected<ShaderModuleHandle> createModule(VkDevice device, std::span<const uint3
 
 }  // namespace
 
-Expected<Kernel> Kernel::create(VkDevice device, std::span<const uint32_t> spirv,
+Expected<Kernel> Kernel::create(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
                                 std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
                                 std::span<const Specialisation> pipelines, uint32_t set_count) {
     Kernel kernel;
-    DIMMER_TRY(kernel.createLayouts(device, bindings.first(bindings.size() / set_count), push_constant_bytes));
-    DIMMER_TRY(kernel.createDescriptors(device, bindings, set_count));
-    DIMMER_TRY(kernel.createPipelines(device, spirv, pipelines));
+    DIMMER_TRY(kernel.createLayouts(vulkan.device, bindings.first(bindings.size() / set_count), push_constant_bytes));
+    DIMMER_TRY(kernel.createDescriptors(vulkan.device, bindings, set_count));
+    DIMMER_TRY(kernel.createPipelines(vulkan, spirv, pipelines));
     return kernel;
 }
 
@@ -125,9 +125,9 @@ Expected<VkDescriptorSet> Kernel::createSet(VkDevice device, std::span<const Ker
     return set;
 }
 
-Expected<void> Kernel::createPipelines(VkDevice device, std::span<const uint32_t> spirv,
+Expected<void> Kernel::createPipelines(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
                                        std::span<const Specialisation> specialisations) {
-    const auto module = createModule(device, spirv);
+    const auto module = createModule(vulkan.device, spirv);
     if (!module) return std::unexpected(module.error());
     constexpr uint32_t word = sizeof(uint32_t);
     std::vector<std::vector<VkSpecializationMapEntry>> entries(specialisations.size());
@@ -148,10 +148,10 @@ Expected<void> Kernel::createPipelines(VkDevice device, std::span<const uint32_t
         info.basePipelineIndex = -1;
     }
     std::vector<VkPipeline> made(specialisations.size(), VK_NULL_HANDLE);
-    const VkResult result = vkCreateComputePipelines(device, VK_NULL_HANDLE, static_cast<uint32_t>(infos.size()),
-                                                     infos.data(), nullptr, made.data());
+    const VkResult result = vkCreateComputePipelines(
+        vulkan.device, vulkan.pipeline_cache, static_cast<uint32_t>(infos.size()), infos.data(), nullptr, made.data());
     // Some may exist even when others failed.
-    for (VkPipeline pipeline : made) pipelines_.emplace_back(device, pipeline);
+    for (VkPipeline pipeline : made) pipelines_.emplace_back(vulkan.device, pipeline);
     if (result < 0) return vulkanError(result, "vkCreateComputePipelines");
     return {};
 }

@@ -27,7 +27,7 @@ using Specialisation = std::vector<uint32_t>;
 class Kernel {
    public:
     // `bindings`: one list after another of as many, where there are several sets to choose from.
-    static Expected<Kernel> create(VkDevice device, std::span<const uint32_t> spirv,
+    static Expected<Kernel> create(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
                                    std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
                                    std::span<const Specialisation> pipelines, uint32_t set_count = 1);
 
@@ -44,7 +44,7 @@ class Kernel {
                                  uint32_t push_constant_bytes);
     Expected<void> createDescriptors(VkDevice device, std::span<const KernelBinding> bindings, uint32_t set_count);
     Expected<VkDescriptorSet> createSet(VkDevice device, std::span<const KernelBinding> bindings) const;
-    Expected<void> createPipelines(VkDevice device, std::span<const uint32_t> spirv,
+    Expected<void> createPipelines(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
                                    std::span<const Specialisation> specialisations);
 
     SetLayoutHandle set_layout_;

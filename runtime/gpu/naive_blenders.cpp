@@ -89,7 +89,7 @@ Expected<GatherBlender> GatherBlender::create(const VulkanContext& vulkan, const
     };
     const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
     blender.weight_scale_ = weightScale(data.color_format);
-    auto kernel = Kernel::create(vulkan.device, spirv::gather_texels_comp, bindings, sizeof(uint32_t), pipelines);
+    auto kernel = Kernel::create(vulkan, spirv::gather_texels_comp, bindings, sizeof(uint32_t), pipelines);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
     return blender;
@@ -103,7 +103,7 @@ void GatherBlender::write(const Planner& planner, uint32_t) {
     }
 }
 
-uint32_t GatherBlender::dispatch(VkCommandBuffer commands, const Planner&, uint32_t) const {
+uint32_t GatherBlender::dispatch(VkCommandBuffer commands, const Planner&, UpdateTarget) const {
     kernel_.bind(commands, 0);
     kernel_.push(commands, receivers_);
     dispatchRows(commands, (receivers_ + workgroup_size - 1) / workgroup_size, groups_x_max_);
@@ -156,7 +156,7 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     const auto format = static_cast<uint32_t>(data.color_format);
     blender.weight_scale_ = weightScale(data.color_format);
     const Specialisation passes[] = {{0, format}, {1, format}, {2, format}};
-    auto kernel = Kernel::create(vulkan.device, spirv::scatter_texels_comp, bindings, 5 * sizeof(uint32_t), passes);
+    auto kernel = Kernel::create(vulkan, spirv::scatter_texels_comp, bindings, 5 * sizeof(uint32_t), passes);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
     return blender;
@@ -166,7 +166,7 @@ uint64_t ScatterBlender::deviceBytes() const {
     return bytesOf({&addresses_, &base_, &payload_, &receivers_of_records_}) + sums_.size_bytes;
 }
 
-uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t) const {
+uint32_t ScatterBlender::dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget) const {
     struct Constants {
         uint32_t count, first_record;
         float r, g, b;

@@ -12,8 +12,8 @@ class GatherBlender : public TexelExecutor {
    public:
     static Expected<GatherBlender> create(const VulkanContext& vulkan, const PackData& data, const LightmapPages& pages,
                                           Transfer& transfer);
-    void write(const Planner& planner, uint32_t page_set) override;
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    void write(const Planner& planner, uint32_t list) override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const override;
     uint64_t deviceBytes() const override;
     uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
@@ -30,7 +30,7 @@ class ScatterBlender : public TexelExecutor {
     static Expected<ScatterBlender> create(const VulkanContext& vulkan, const PackData& data,
                                            const LightmapPages& pages, Transfer& transfer);
     void write(const Planner&, uint32_t) override {}  // weights are push constants
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const override;
     uint64_t deviceBytes() const override;
     uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 

@@ -49,7 +49,7 @@ Expected<void> checkLimits(const VulkanContext& vulkan, const ProbeData& probes)
 }  // namespace
 
 Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
-                                            const ProbeAtlas& atlas, Transfer& transfer) {
+                                            const ProbeAtlas& atlas, uint32_t lists, Transfer& transfer) {
     DIMMER_TRY(checkLimits(vulkan, data.probes));
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
@@ -57,8 +57,8 @@ Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const P
     blender.data_ = &data.probes;
     blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
-    for (uint32_t i = 0; i < atlas.setCount(); ++i) DIMMER_TRY(blender.createSet(vulkan, planner));
-    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, atlas));
+    for (uint32_t i = 0; i < lists; ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
+    DIMMER_TRY(blender.createKernel(vulkan, data.color_format, planner, atlas));
     return blender;
 }
 
@@ -77,52 +77,52 @@ Expected<void> ProbeBlender::createTables(const VulkanContext& vulkan, const Pac
     return keep(uploadStream<6, 1>(vulkan, transfer, data, VK_FORMAT_R32_UINT), records_4_);
 }
 
-Expected<void> ProbeBlender::createSet(const VulkanContext& vulkan, const Planner& planner) {
-    Set set;
+Expected<void> ProbeBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
+    Work work;
     DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
-                    set.items));
+                    work.items));
     DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-                    set.terms));
-    sets_.push_back(std::move(set));
+                    work.terms));
+    work_.push_back(std::move(work));
     return {};
 }
 
-Expected<void> ProbeBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+Expected<void> ProbeBlender::createKernel(const VulkanContext& vulkan, ColorFormat format, const Planner& planner,
                                           const ProbeAtlas& atlas) {
     std::vector<Specialisation> pipelines;
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
         pipelines.push_back({group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
                              static_cast<uint32_t>(format)});
     std::vector<KernelBinding> bindings;
-    for (uint32_t i = 0; i < sets_.size(); ++i) {
-        const Set& set = sets_[i];
-        const TexelBuffer* const tables[] = {&places_,    &numbers_,  &records_16_, &records_8_,
-                                             &records_4_, &set.items, &set.terms};
-        for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
-        bindings.push_back(KernelBinding::ofBuffer(atlas.buffer(i)));
-    }
-    auto kernel = Kernel::create(device, spirv::blend_probes_comp, bindings, sizeof(DispatchedItems), pipelines,
-                                 static_cast<uint32_t>(sets_.size()));
+    for (uint32_t set = 0; set < atlas.setCount(); ++set)
+        for (const Work& work : work_) {
+            const TexelBuffer* const tables[] = {&places_,    &numbers_,   &records_16_, &records_8_,
+                                                 &records_4_, &work.items, &work.terms};
+            for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
+            bindings.push_back(KernelBinding::ofBuffer(atlas.buffer(set)));
+        }
+    auto kernel = Kernel::create(vulkan, spirv::blend_probes_comp, bindings, sizeof(DispatchedItems), pipelines,
+                                 atlas.setCount() * static_cast<uint32_t>(work_.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
 }
 
-void ProbeBlender::write(const Planner& planner, uint32_t set) {
+void ProbeBlender::write(const Planner& planner, uint32_t list) {
     const WorkList& work = planner.work();
-    std::memcpy(sets_[set].items.buffer.mapped, work.items.data(), work.items.size_bytes());
-    auto* terms = reinterpret_cast<WorkTerm*>(sets_[set].terms.buffer.mapped);
+    std::memcpy(work_[list].items.buffer.mapped, work.items.data(), work.items.size_bytes());
+    auto* terms = reinterpret_cast<WorkTerm*>(work_[list].terms.buffer.mapped);
     const auto receivers = static_cast<uint32_t>(data_->numbers.size());
     for (const WorkTerm& term : work.terms)
         *terms++ = {receivers + data_->terms[term.term].first_record, term.weight_r, term.weight_g, term.weight_b};
 }
 
-uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t set) const {
+uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const {
     uint32_t dispatches = 0;
     for (uint32_t i = 0; i < work_group_count; ++i) {
         const WorkGroup& group = planner.work().groups[i];
         if (group.item_count == 0) continue;
-        kernel_.bind(commands, i, set);
+        kernel_.bind(commands, i, target.set * static_cast<uint32_t>(work_.size()) + target.list);
         kernel_.push(commands, DispatchedItems{group.first_item, group.item_count});
         dispatchRows(commands, (group.item_count + probe_items_per_workgroup - 1) / probe_items_per_workgroup,
                      groups_x_max_);
@@ -133,7 +133,7 @@ uint32_t ProbeBlender::dispatch(VkCommandBuffer commands, const Planner& planner
 
 uint64_t ProbeBlender::deviceBytes() const {
     uint64_t bytes = bytesOf({&places_, &numbers_, &records_16_, &records_8_, &records_4_});
-    for (const Set& set : sets_) bytes += bytesOf({&set.items, &set.terms});
+    for (const Work& work : work_) bytes += bytesOf({&work.items, &work.terms});
     return bytes;
 }
 

@@ -39,8 +39,8 @@ Expected<GpuBuffer> uploadGridTable(const VulkanContext& vulkan, const GlobalGri
 }
 
 Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, const PackData& data,
-                                                const ModelSlots& models, const ProbeAtlas& atlas, VkBuffer grid_table,
-                                                Transfer& transfer) {
+                                                const ModelSlots& models, const ProbeAtlas& atlas, uint32_t lists,
+                                                VkBuffer grid_table, Transfer& transfer) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     ProbeResampler resampler;
@@ -54,39 +54,42 @@ Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, con
                                [](VkDeviceSize, std::span<std::byte> piece) {
                                    std::ranges::fill(piece, std::byte{0xff});  // no_tetrahedron
                                }));
-    std::vector<KernelBinding> bindings;
-    for (uint32_t set = 0; set < atlas.setCount(); ++set) {
+    for (uint32_t i = 0; i < lists; ++i) {
         auto items = createTexelBuffer(vulkan, models.itemsMax() * sizeof(ResampleItem), VK_FORMAT_R32G32B32A32_UINT,
                                        MemoryUse::Upload);
         if (!items) return std::unexpected(std::move(items.error()));
-        bindings.insert(
-            bindings.end(),
-            {KernelBinding::ofTexels(items->view.get()), KernelBinding::ofBuffer(grid_table),
-             KernelBinding::ofBuffer(atlas.buffer(set)), KernelBinding::ofBuffer(resampler.hints_.buffer.get())});
-        resampler.sets_.push_back({std::move(*items), 0});
+        resampler.work_.push_back({std::move(*items), 0});
     }
+    std::vector<KernelBinding> bindings;
+    for (uint32_t set = 0; set < atlas.setCount(); ++set)
+        for (const Work& work : resampler.work_)
+            bindings.insert(
+                bindings.end(),
+                {KernelBinding::ofTexels(work.items.view.get()), KernelBinding::ofBuffer(grid_table),
+                 KernelBinding::ofBuffer(atlas.buffer(set)), KernelBinding::ofBuffer(resampler.hints_.buffer.get())});
     const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
-    auto kernel = Kernel::create(vulkan.device, spirv::resample_probes_comp, bindings, sizeof(ResampledItems),
-                                 pipelines, atlas.setCount());
+    auto kernel = Kernel::create(vulkan, spirv::resample_probes_comp, bindings, sizeof(ResampledItems), pipelines,
+                                 atlas.setCount() * lists);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     resampler.kernel_ = std::move(*kernel);
     return resampler;
 }
 
-void ProbeResampler::write(std::span<const ResampleItem> items, uint32_t set) {
-    std::memcpy(sets_[set].items.buffer.mapped, items.data(), items.size_bytes());
-    sets_[set].item_count = static_cast<uint32_t>(items.size());
+void ProbeResampler::write(std::span<const ResampleItem> items, uint32_t list) {
+    std::memcpy(work_[list].items.buffer.mapped, items.data(), items.size_bytes());
+    work_[list].item_count = static_cast<uint32_t>(items.size());
 }
 
-void ProbeResampler::dispatch(VkCommandBuffer commands, uint32_t set) const {
-    kernel_.bind(commands, 0, set);
-    kernel_.push(commands, ResampledItems{sets_[set].item_count, first_moving_});
-    dispatchRows(commands, sets_[set].item_count, groups_x_max_);
+void ProbeResampler::dispatch(VkCommandBuffer commands, UpdateTarget target) const {
+    const uint32_t items = work_[target.list].item_count;
+    kernel_.bind(commands, 0, target.set * static_cast<uint32_t>(work_.size()) + target.list);
+    kernel_.push(commands, ResampledItems{items, first_moving_});
+    dispatchRows(commands, items, groups_x_max_);
 }
 
 uint64_t ProbeResampler::deviceBytes() const {
     uint64_t bytes = hints_.size_bytes;
-    for (const Set& set : sets_) bytes += bytesOf({&set.items});
+    for (const Work& work : work_) bytes += bytesOf({&work.items});
     return bytes;
 }
 

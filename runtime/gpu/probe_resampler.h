@@ -4,6 +4,7 @@
 
 #include <gpu/kernel.h>
 #include <gpu/probe_atlas.h>
+#include <gpu/texel_executor.h>
 #include <probes/model_slots.h>
 
 #include <span>
@@ -16,20 +17,21 @@ Expected<GpuBuffer> uploadGridTable(const VulkanContext& vulkan, const GlobalGri
 class ProbeResampler {
    public:
     static Expected<ProbeResampler> create(const VulkanContext& vulkan, const PackData& data, const ModelSlots& models,
-                                           const ProbeAtlas& atlas, VkBuffer grid_table, Transfer& transfer);
+                                           const ProbeAtlas& atlas, uint32_t lists, VkBuffer grid_table,
+                                           Transfer& transfer);
 
-    void write(std::span<const ResampleItem> items, uint32_t set);
+    void write(std::span<const ResampleItem> items, uint32_t list);
     // One dispatch for what was written.
-    void dispatch(VkCommandBuffer commands, uint32_t set) const;
+    void dispatch(VkCommandBuffer commands, UpdateTarget target) const;
     uint64_t deviceBytes() const;
     uint32_t pipelineCount() const { return kernel_.pipelineCount(); }
 
    private:
-    struct Set {
+    struct Work {
         TexelBuffer items;
         uint32_t item_count = 0;
     };
-    std::vector<Set> sets_;
+    std::vector<Work> work_;
     GpuBuffer hints_;
     Kernel kernel_;
     uint32_t first_moving_ = 0, groups_x_max_ = 0;

@@ -13,8 +13,12 @@ constexpr VkDeviceSize staging_bytes = 4 << 20;
 
 }  // namespace
 
-RecordLoader::RecordLoader(const VulkanContext& vulkan, VkQueue queue, uint32_t queue_family)
-    : vulkan_(vulkan), queue_(queue), queue_family_(queue_family) {}
+RecordLoader::RecordLoader(const VulkanContext& vulkan, VkQueue queue, uint32_t queue_family, size_t elements,
+                           size_t contributions)
+    : vulkan_(vulkan), queue_(queue), queue_family_(queue_family), pieces_(contributions), left_(elements) {
+    regions_.reserve(contributions);
+    ends_.reserve(contributions);
+}
 
 RecordLoader::~RecordLoader() {
     if (!in_flight_) return;
@@ -24,7 +28,6 @@ RecordLoader::~RecordLoader() {
 
 void RecordLoader::add(uint32_t light_set, std::span<const uint32_t> contributions, const RecordStore& store) {
     if (!busy()) done_ = total_ = 0;
-    if (left_.size() <= light_set) left_.resize(light_set + 1);
     for (const uint32_t contribution : contributions) {
         if (store.byteCount(contribution) == 0) continue;
         total_ += store.byteCount(contribution);
@@ -41,7 +44,7 @@ void RecordLoader::cancel(uint32_t light_set, const RecordStore& store) {
 }
 
 bool RecordLoader::pending(uint32_t light_set) const {
-    return light_set < left_.size() && left_[light_set] > 0;
+    return left_[light_set] > 0;
 }
 
 Expected<void> RecordLoader::create() {

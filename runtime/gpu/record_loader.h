@@ -7,8 +7,10 @@ namespace dimmer {
 
 class RecordLoader {
    public:
-    // Holds no memory and no commands until there is something to load.
-    RecordLoader(const VulkanContext& vulkan, VkQueue queue, uint32_t queue_family);
+    // Of a pack with so many elements and contributions. Holds no device memory and no commands until there is
+    // something to load, and takes no host memory later: what add() and cancel() are asked for they do.
+    RecordLoader(const VulkanContext& vulkan, VkQueue queue, uint32_t queue_family, size_t elements,
+                 size_t contributions);
     ~RecordLoader();
     RecordLoader(const RecordLoader&) = delete;
     RecordLoader& operator=(const RecordLoader&) = delete;

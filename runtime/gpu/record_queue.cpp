@@ -32,17 +32,17 @@ uint64_t RecordQueue::fill(const RecordStore& store, std::span<std::byte> stagin
 }
 
 void RecordQueue::advance(const RecordStore& store, uint64_t bytes, std::vector<uint32_t>& ended) {
-    while (bytes > 0 && !waiting_.empty()) {
-        Load& load = waiting_.front();
-        const uint64_t left = store.byteCount(load.contribution) - load.next_byte;
+    auto next = waiting_.begin();
+    for (; next != waiting_.end(); ++next) {
+        const uint64_t left = store.byteCount(next->contribution) - next->next_byte;
         if (bytes < left) {
-            load.next_byte += bytes;
-            return;
+            next->next_byte += bytes;
+            break;
         }
         bytes -= left;
-        ended.push_back(load.light_set);
-        waiting_.pop_front();
+        ended.push_back(next->light_set);
     }
+    waiting_.erase(waiting_.begin(), next);
 }
 
 }  // namespace dimmer

@@ -3,13 +3,16 @@
 
 #include <gpu/record_store.h>
 
-#include <deque>
+#include <vector>
 
 namespace dimmer {
 
 class RecordQueue {
    public:
     static constexpr uint32_t no_light_set = ~0u;  // of contributions of the base and of doors
+
+    // Allocates for so many contributions that wait at a time; nothing else does.
+    explicit RecordQueue(size_t contributions_max) { waiting_.reserve(contributions_max); }
 
     // The store has reserved the contribution's range.
     void add(uint32_t light_set, uint32_t contribution, const RecordStore& store);
@@ -19,7 +22,7 @@ class RecordQueue {
     bool empty() const { return waiting_.empty(); }
 
     // Writes what comes next into `staging`, to its end or the queue's; `regions` says where each part belongs in the
-    // store's buffer. Returns the bytes written.
+    // store's buffer, a part for each contribution at most. Returns the bytes written.
     uint64_t fill(const RecordStore& store, std::span<std::byte> staging, std::vector<VkBufferCopy>& regions) const;
     // So many bytes of what fill() wrote are sent. Appends the light set of each contribution that has nothing left.
     void advance(const RecordStore& store, uint64_t bytes, std::vector<uint32_t>& ended);
@@ -29,7 +32,7 @@ class RecordQueue {
         uint32_t light_set, contribution;
         uint64_t next_byte;
     };
-    std::deque<Load> waiting_;
+    std::vector<Load> waiting_;  // the next one first
 };
 
 }  // namespace dimmer

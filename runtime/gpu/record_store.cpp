@@ -1,6 +1,5 @@
 #include <gpu/record_store.h>
 
-#include <fmt/format.h>
 #include <gpu/vk_result.h>
 
 #include <numeric>
@@ -31,7 +30,7 @@ Expected<RecordStore> RecordStore::create(const VulkanContext& vulkan, const Pac
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     store.buffer_ = std::move(*buffer);
     if (records < all) {
-        store.pool_ = RecordPool(records);
+        store.pool_ = RecordPool(records, data.contributions.size());
         return store;
     }
     // Ranges of their own: those of a pool, taken back and given out in any order, would come to lie in its way.
@@ -43,27 +42,33 @@ Expected<RecordStore> RecordStore::create(const VulkanContext& vulkan, const Pac
     return store;
 }
 
-Expected<void> RecordStore::reserve(uint32_t contribution) {
-    if (reserved(contribution)) return {};
+bool RecordStore::reserve(uint32_t contribution) {
+    if (reserved(contribution)) return true;
     if (!home_.empty()) {
         first_[contribution] = home_[contribution];
-        return {};
+        return true;
     }
     const auto first = pool_.allocate(counts_[contribution]);
-    if (!first && counts_[contribution] > 0)
-        return fail(
-            ErrorCode::OutOfMemory,
-            fmt::format("There is no room for the {} bytes of records of contribution {}: the largest free range "
-                        "has {} bytes. Drop a light set, or create the runtime with more records_bytes_max.",
-                        byteCount(contribution), contribution, pool_.largestFree() * sizeof(TexelRecord)));
+    if (!first && counts_[contribution] > 0) return false;
     first_[contribution] = first.value_or(0);
-    return {};
+    return true;
 }
 
 void RecordStore::release(uint32_t contribution) {
     if (!reserved(contribution)) return;
     if (home_.empty()) pool_.release(*first_[contribution], counts_[contribution]);
     first_[contribution].reset();
+}
+
+uint64_t RecordStore::freeBytes() const {
+    uint64_t bytes = buffer_.buffer.size_bytes;
+    for (uint32_t k = 0; k < first_.size(); ++k)
+        if (reserved(k)) bytes -= byteCount(k);
+    return bytes;
+}
+
+uint64_t RecordStore::largestFreeBytes() const {
+    return home_.empty() ? pool_.largestFree() * sizeof(TexelRecord) : freeBytes();
 }
 
 uint64_t RecordStore::firstByte(uint32_t contribution) const {

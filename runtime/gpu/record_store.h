@@ -21,8 +21,8 @@ class RecordStore {
     uint64_t deviceBytes() const { return buffer_.buffer.size_bytes; }
 
     // A range for the contribution's records; they are still to be written. Where there is room for all, each has its
-    // own. OutOfMemory where no free range is long enough.
-    Expected<void> reserve(uint32_t contribution);
+    // own. False: no free range is long enough.
+    bool reserve(uint32_t contribution);
     // Its range is free for others. Commands that read it must be submitted before those that write others there.
     void release(uint32_t contribution);
     bool reserved(uint32_t contribution) const { return first_[contribution].has_value(); }
@@ -30,6 +30,9 @@ class RecordStore {
     // Where the range begins and how long it is, in bytes of the buffer.
     uint64_t firstByte(uint32_t contribution) const;
     uint64_t byteCount(uint32_t contribution) const { return counts_[contribution] * sizeof(TexelRecord); }
+    // In no contribution's range; and in the largest range of those. Where there is room for all, all of it is one.
+    uint64_t freeBytes() const;
+    uint64_t largestFreeBytes() const;
     // Writes the contribution's records, from `offset` bytes into them.
     void fill(uint32_t contribution, uint64_t offset, std::span<std::byte> piece) const;
     // To which the place of a receiver (DevicePlaces) is added for its record of a term of the pack; wraps.

@@ -57,6 +57,14 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
     return SemaphoreHandle(device, semaphore);
 }
 
+constexpr uint32_t frames_max = 8;
+
+Expected<void> checkOptions(const RuntimeOptions& options) {
+    if (options.frames_in_flight >= 1 && options.frames_in_flight <= frames_max) return {};
+    return fail(ErrorCode::InvalidArgument, fmt::format("RuntimeOptions::frames_in_flight is {}; it is 1 to {}.",
+                                                        options.frames_in_flight, frames_max));
+}
+
 // What the other queue wrote, and the host has waited for, is available; a host wait does not make it visible here.
 void seeOtherQueue(VkCommandBuffer commands) {
     constexpr VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT | VK_PIPELINE_STAGE_TRANSFER_BIT;
@@ -99,32 +107,41 @@ struct Runtime::Impl {
     struct Recording {
         bool texels, probes, models;
         uint32_t target, probe_target, front, probe_front;
+        uint32_t list;  // likewise, that the next update takes then
     };
     std::optional<Recording> recorded;
+    // What an update that may be on its way has for itself, beside the work list of the same number.
+    struct List {
+        CommandBuffer own;       // for submit()
+        uint64_t submitted = 0;  // the timeline's value when submit()'s update with it is done; 0: record() had it last
+    };
+    std::vector<List> lists;
+    uint32_t list = 0;                                 // of the last update
     std::optional<RecordLoader> loader;                // none in modes that load nothing later
     std::vector<LightSet> loading;                     // sets whose records are on their way
     std::vector<RecordsState> records;                 // per element
     std::vector<std::vector<uint32_t>> contributions;  // likewise
     std::optional<UpdateTimer> timer;
-    CommandBuffer own;
     SemaphoreHandle timeline;
     uint64_t submitted = 0;  // the timeline's value when the last submission is done
     UpdateStats stats;       // of the last update
     bool timed = false;      // the last update wrote timestamps that were not read yet
 
-    ~Impl() { (void)waitForSubmitted(); }
+    ~Impl() { (void)waitFor(submitted); }
 
     Expected<void> create(const PackData& data, const Planner& planner, const Planner* probe_planner,
                           const ModelSlots& models, const RuntimeOptions& options);
     Expected<void> createExecutors(const PackData& data, const Planner& planner, const RuntimeOptions& options,
                                    Transfer& transfer);
     Expected<void> createProbes(const PackData& data, const Planner* probe_planner, const ModelSlots& models,
-                                Transfer& transfer);
+                                uint32_t list_count, Transfer& transfer);
+    Expected<void> createLists(uint32_t count);
     uint32_t dispatchProbes(VkCommandBuffer commands, const Planner* probe_planner, VkPipelineStageFlags readers);
     Expected<void> createPages(const PackData& data, uint32_t count, Transfer& transfer);
     VkQueue ownQueue() const { return vulkan.compute_queue ? vulkan.compute_queue : vulkan.queue; }
     uint32_t ownFamily() const { return vulkan.compute_queue ? vulkan.compute_queue_family : vulkan.queue_family; }
-    Expected<void> waitForSubmitted() const;
+    Expected<void> waitFor(uint64_t value) const;
+    Expected<void> takeList(bool for_recording);
     void recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner, bool drawing);
     Expected<void> submitUpdate(const Planner& planner, const Planner* probe_planner, const SubmitWait& wait);
 };
@@ -135,7 +152,8 @@ Expected<void> Runtime::Impl::createExecutors(const PackData& data, const Planne
     auto made = createExecutor(vulkan, options, data, planner, pages, transfer);
     if (!made) return std::unexpected(std::move(made.error()));
     executor = std::move(*made);
-    if (executor->records()) loader.emplace(vulkan, ownQueue(), ownFamily());
+    if (executor->records())
+        loader.emplace(vulkan, ownQueue(), ownFamily(), data.elements.size(), data.contributions.size());
     return {};
 }
 
@@ -147,14 +165,26 @@ Expected<void> keepIn(std::optional<T>& slot, Expected<T> made) {
 }
 
 Expected<void> Runtime::Impl::createProbes(const PackData& data, const Planner* probe_planner, const ModelSlots& models,
-                                           Transfer& transfer) {
+                                           uint32_t list_count, Transfer& transfer) {
     if (data.probes.base.empty()) return {};
     DIMMER_TRY(keepIn(atlas, ProbeAtlas::create(vulkan, data, models.probesMax(), probe_sets, transfer)));
-    if (probe_planner) DIMMER_TRY(keepIn(probes, ProbeBlender::create(vulkan, data, *probe_planner, *atlas, transfer)));
+    if (probe_planner)
+        DIMMER_TRY(keepIn(probes, ProbeBlender::create(vulkan, data, *probe_planner, *atlas, list_count, transfer)));
     if (data.probes.global.empty()) return {};
     DIMMER_TRY(keepIn(grid_table, uploadGridTable(vulkan, data.probes.global, transfer)));
     if (models.probesMax() == 0) return {};
-    return keepIn(resampler, ProbeResampler::create(vulkan, data, models, *atlas, grid_table->buffer.get(), transfer));
+    return keepIn(resampler,
+                  ProbeResampler::create(vulkan, data, models, *atlas, list_count, grid_table->buffer.get(), transfer));
+}
+
+Expected<void> Runtime::Impl::createLists(uint32_t count) {
+    lists.resize(count);
+    for (List& made : lists) {
+        auto commands = createCommandBuffer(vulkan.device, ownFamily());
+        if (!commands) return std::unexpected(std::move(commands.error()));
+        made.own = std::move(*commands);
+    }
+    return {};
 }
 
 Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planner, const Planner* probe_planner,
@@ -170,19 +200,16 @@ Expected<void> Runtime::Impl::create(const PackData& data, const Planner& planne
     auto made_timeline = createTimeline(vulkan.device);
     if (!made_timeline) return std::unexpected(std::move(made_timeline.error()));
     timeline = std::move(*made_timeline);
-    DIMMER_TRY(createProbes(data, probe_planner, models, *transfer));
+    DIMMER_TRY(createProbes(data, probe_planner, models, options.frames_in_flight, *transfer));
     if (!changes) return {};
 
     DIMMER_TRY(createExecutors(data, planner, options, *transfer));
     if (options.timestamps) {
-        auto made_timer = UpdateTimer::create(vulkan);
+        auto made_timer = UpdateTimer::create(vulkan, options.frames_in_flight);
         if (!made_timer) return std::unexpected(std::move(made_timer.error()));
         timer = std::move(*made_timer);
     }
-    auto made_commands = createCommandBuffer(vulkan.device, ownFamily());
-    if (!made_commands) return std::unexpected(std::move(made_commands.error()));
-    own = std::move(*made_commands);
-    return {};
+    return createLists(options.frames_in_flight);
 }
 
 Expected<void> Runtime::Impl::createPages(const PackData& data, uint32_t count, Transfer& transfer) {
@@ -194,30 +221,40 @@ Expected<void> Runtime::Impl::createPages(const PackData& data, uint32_t count, 
     return {};
 }
 
-Expected<void> Runtime::Impl::waitForSubmitted() const {
-    if (submitted == 0) return {};
+Expected<void> Runtime::Impl::waitFor(uint64_t value) const {
+    if (value == 0) return {};
     const VkSemaphore semaphore = timeline.get();
     auto info = vkStruct<VkSemaphoreWaitInfo>(VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO);
     info.semaphoreCount = 1;
     info.pSemaphores = &semaphore;
-    info.pValues = &submitted;
+    info.pValues = &value;
     DIMMER_VK(vkWaitSemaphores, vulkan.device, &info, std::numeric_limits<uint64_t>::max());
+    return {};
+}
+
+// The next update's, once submit()'s update that had it before is done. What the other queue does, a recording cannot
+// be ordered behind but by waiting.
+Expected<void> Runtime::Impl::takeList(bool for_recording) {
+    const uint32_t next = (list + 1) % static_cast<uint32_t>(lists.size());
+    DIMMER_TRY(waitFor(for_recording && ownQueue() != vulkan.queue ? submitted : lists[next].submitted));
+    list = next;
+    lists[list].submitted = 0;
     return {};
 }
 
 void Runtime::Impl::recordUpdate(VkCommandBuffer commands, const Planner& planner, const Planner* probe_planner,
                                  bool drawing) {
     if (ownQueue() != vulkan.queue) seeOtherQueue(commands);
-    if (texels_planned) executor->write(planner, target);
-    if (probes_planned) probes->write(*probe_planner, probe_target);
-    if (models_planned) resampler->write(model_items, probe_target);
-    if (timer) timer->reset(commands);
+    if (texels_planned) executor->write(planner, list);
+    if (probes_planned) probes->write(*probe_planner, list);
+    if (models_planned) resampler->write(model_items, list);
+    if (timer) timer->reset(commands, list);
     if (texels_planned) pages[target].beginWrites(commands, drawing);
-    if (timer) timer->begin(commands);
-    if (texels_planned) stats.dispatches += executor->dispatch(commands, planner, target);
+    if (timer) timer->begin(commands, list);
+    if (texels_planned) stats.dispatches += executor->dispatch(commands, planner, {target, list});
     if (probes_planned || models_planned)
         stats.dispatches += dispatchProbes(commands, probe_planner, pages[target].readers(drawing));
-    if (timer) timer->end(commands);
+    if (timer) timer->end(commands, list);
     if (texels_planned) pages[target].endWrites(commands, drawing);
     timed = timer.has_value();
 }
@@ -226,10 +263,10 @@ uint32_t Runtime::Impl::dispatchProbes(VkCommandBuffer commands, const Planner* 
                                        VkPipelineStageFlags readers) {
     uint32_t dispatches = 0;
     ProbeAtlas::beginWrites(commands, readers);
-    if (probes_planned) dispatches += probes->dispatch(commands, *probe_planner, probe_target);
+    if (probes_planned) dispatches += probes->dispatch(commands, *probe_planner, {probe_target, list});
     if (models_planned) {
         ProbeAtlas::betweenWrites(commands);
-        resampler->dispatch(commands, probe_target);
+        resampler->dispatch(commands, {probe_target, list});
         ++dispatches;
     }
     ProbeAtlas::endWrites(commands, readers);
@@ -240,9 +277,10 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
                                            const SubmitWait& wait) {
     auto begin = vkStruct<VkCommandBufferBeginInfo>(VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO);
     begin.flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT;
-    DIMMER_VK(vkBeginCommandBuffer, own.commands, &begin);
-    recordUpdate(own.commands, planner, probe_planner, ownQueue() == vulkan.queue);
-    DIMMER_VK(vkEndCommandBuffer, own.commands);
+    const VkCommandBuffer commands = lists[list].own.commands;
+    DIMMER_VK(vkBeginCommandBuffer, commands, &begin);
+    recordUpdate(commands, planner, probe_planner, ownQueue() == vulkan.queue);
+    DIMMER_VK(vkEndCommandBuffer, commands);
 
     const VkSemaphore semaphore = timeline.get();
     const uint64_t value = submitted + 1;
@@ -253,7 +291,7 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
     values.pWaitSemaphoreValues = &wait.value;
     auto info = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO, &values);
     info.commandBufferCount = 1;
-    info.pCommandBuffers = &own.commands;
+    info.pCommandBuffers = &commands;
     info.signalSemaphoreCount = 1;
     info.pSignalSemaphores = &semaphore;
     const VkPipelineStageFlags stages = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
@@ -261,12 +299,13 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
     info.pWaitSemaphores = &wait.semaphore;
     info.pWaitDstStageMask = &stages;
     DIMMER_VK(vkQueueSubmit, ownQueue(), 1, &info, VK_NULL_HANDLE);
-    submitted = value;
+    submitted = lists[list].submitted = value;
     return {};
 }
 
 Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options) {
     DIMMER_TRY(checkHandles(vulkan));
+    DIMMER_TRY(checkOptions(options));
     auto functions = VulkanFunctions::load(vulkan.get_instance_proc_addr, vulkan.instance);
     if (!functions) return std::unexpected(std::move(functions.error()));
     DIMMER_TRY(checkDevice(vulkan));
@@ -275,6 +314,7 @@ Expected<Runtime> Runtime::create(const VulkanContext& vulkan, const Pack& pack,
     impl->vulkan = vulkan;
     impl->page_sets = options.buffering == Buffering::Double ? 2 : 1;
     impl->contributions = contributionsOfSets(pack.data());
+    impl->loading.reserve(pack.elements().size());
     impl->records.assign(pack.elements().size(), options.load_records ? RecordsState::Loaded : RecordsState::Dropped);
     Runtime runtime(pack, std::move(impl), options.moving_probes_max);
     DIMMER_TRY(runtime.impl_->create(runtime.pack().data(), runtime.planner(),
@@ -367,17 +407,18 @@ void Runtime::finish() {
 }
 
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
-    const auto start = std::chrono::steady_clock::now();
+    auto start = std::chrono::steady_clock::now();
     UpdateStats planned;
     const bool works = planNext(planned);
     planned.host_us = microsecondsSince(start);
     if (!works) return planned;
     impl_->stats = planned;
-    // An update that submit() sent may still be reading the work list.
-    if (auto done = impl_->waitForSubmitted(); !done) {
+    const uint32_t list_before = impl_->list;
+    if (auto taken = impl_->takeList(true); !taken) {
         rollback();
-        return std::unexpected(std::move(done.error()));
+        return std::unexpected(std::move(taken.error()));
     }
+    start = std::chrono::steady_clock::now();
     impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
     impl_->recorded = Impl::Recording{.texels = impl_->texels_planned,
                                       .probes = impl_->probes_planned,
@@ -385,16 +426,17 @@ Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
                                       .target = impl_->target,
                                       .probe_target = impl_->probe_target,
                                       .front = impl_->front,
-                                      .probe_front = impl_->probe_front};
+                                      .probe_front = impl_->probe_front,
+                                      .list = list_before};
     finish();
-    impl_->stats.host_us = microsecondsSince(start);
+    impl_->stats.host_us = planned.host_us + microsecondsSince(start);
     return impl_->stats;
 }
 
-void Runtime::discardRecorded() {
+bool Runtime::discardRecorded() {
     Impl& impl = *impl_;
     const auto recorded = std::exchange(impl.recorded, std::nullopt);
-    if (!recorded) return;
+    if (!recorded) return false;
     // Calls that found nothing to do have come in between: the plan is theirs.
     impl.texels_planned = recorded->texels;
     impl.probes_planned = recorded->probes;
@@ -404,6 +446,17 @@ void Runtime::discardRecorded() {
     rollback();
     if (recorded->texels) impl.front = recorded->front;
     if (recorded->probes || recorded->models) impl.probe_front = recorded->probe_front;
+    impl.list = recorded->list;
+    return true;
+}
+
+void Runtime::invalidate() {
+    impl_->recorded.reset();
+    for (uint32_t set = 0; set < impl_->page_sets; ++set) {
+        planner(set).rollbackAll();
+        if (hasProbes()) probePlanner(set).rollbackAll();
+    }
+    models().rollbackAll();
 }
 
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
@@ -414,7 +467,7 @@ Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     if (!works) return planned;
     impl_->stats = planned;
 
-    auto sent = impl_->waitForSubmitted();
+    auto sent = impl_->takeList(false);
     start = std::chrono::steady_clock::now();
     if (sent) sent = impl_->submitUpdate(planner(impl_->target), plannedProbes(), wait);
     if (!sent) {
@@ -434,9 +487,9 @@ uint64_t Runtime::semaphoreValue() const {
 }
 
 Expected<UpdateStats> Runtime::wait() {
-    DIMMER_TRY(impl_->waitForSubmitted());
+    DIMMER_TRY(impl_->waitFor(impl_->submitted));
     if (impl_->timed) {
-        const auto gpu_us = impl_->timer->read();
+        const auto gpu_us = impl_->timer->read(impl_->list);
         if (!gpu_us) return std::unexpected(gpu_us.error());
         if (*gpu_us) {
             impl_->stats.gpu_us = **gpu_us;
@@ -471,17 +524,34 @@ Expected<void> Runtime::dropRecords(LightSet set) {
 Expected<void> Runtime::loadRecords(LightSet set) {
     DIMMER_TRY(checkLoadable(set));
     if (impl_->records[set.element] != RecordsState::Dropped) return {};
-    const auto& contributions = impl_->contributions[set.element];
-    for (const uint32_t k : contributions) {
-        const auto room = impl_->executor->records()->reserve(k);
-        if (room) continue;
-        for (const uint32_t other : contributions) impl_->executor->records()->release(other);
-        return room;
+    if (impl_->loader) {
+        const auto& contributions = impl_->contributions[set.element];
+        RecordStore& store = *impl_->executor->records();
+        if (!std::ranges::all_of(contributions, [&](uint32_t k) { return store.reserve(k); })) {
+            for (const uint32_t k : contributions) store.release(k);
+            return fail(ErrorCode::OutOfMemory,
+                        fmt::format("Light set \"{}\": there is no room for the {} bytes of its records: {} bytes are "
+                                    "free, at most {} of them in a row. Drop a light set, or create the runtime with "
+                                    "more records_bytes_max.",
+                                    pack().elements()[set.element].name, recordBytes(set), store.freeBytes(),
+                                    store.largestFreeBytes()));
+        }
+        impl_->loader->add(set.element, contributions, store);
     }
-    if (impl_->loader) impl_->loader->add(set.element, contributions, *impl_->executor->records());
     impl_->records[set.element] = RecordsState::Loading;
     impl_->loading.push_back(set);
     return {};
+}
+
+uint64_t Runtime::recordBytes(LightSet set) const {
+    if (!impl_->loader || !checkSet(set)) return 0;
+    uint64_t bytes = 0;
+    for (const uint32_t k : impl_->contributions[set.element]) bytes += impl_->executor->records()->byteCount(k);
+    return bytes;
+}
+
+uint64_t Runtime::freeRecordBytes() const {
+    return impl_->loader ? impl_->executor->records()->freeBytes() : 0;
 }
 
 RecordsState Runtime::recordsState(LightSet set) const {
@@ -513,6 +583,10 @@ LightmapImages Runtime::images(uint32_t page_set) const {
 }
 uint32_t Runtime::pageSet() const {
     return impl_->front;
+}
+
+uint32_t Runtime::setCount() const {
+    return impl_->page_sets;
 }
 
 uint32_t Runtime::probeSet() const {
@@ -550,7 +624,7 @@ DeviceFootprint Runtime::footprint() const {
 }
 
 Expected<Runtime::Pages> Runtime::readPages() {
-    DIMMER_TRY(impl_->waitForSubmitted());  // perhaps on another queue
+    DIMMER_TRY(impl_->waitFor(impl_->submitted));  // perhaps on another queue
     auto transfer = Transfer::create(impl_->vulkan, MemoryUse::Readback);
     if (!transfer) return std::unexpected(std::move(transfer.error()));
     auto pages = impl_->pages[impl_->front].read(*transfer);

@@ -83,8 +83,8 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
     blender.records_ = std::move(*records);
     DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
-    for (size_t i = 0; i < page_sets.size(); ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
-    DIMMER_TRY(blender.createKernel(vulkan.device, data.color_format, planner, page_sets));
+    for (uint32_t i = 0; i < options.frames_in_flight; ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
+    DIMMER_TRY(blender.createKernel(vulkan, data.color_format, planner, page_sets));
     return blender;
 }
 
@@ -101,10 +101,15 @@ Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const Pac
 
 // Of every contribution, or of those without a light set, which nothing can load later.
 Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& transfer, bool all) {
-    RecordQueue queue;
+    RecordQueue queue(data.contributions.size());
     for (uint32_t k = 0; k < data.contributions.size(); ++k) {
         if (!all && data.contributions[k].light_set) continue;
-        DIMMER_TRY(records_.reserve(k));
+        if (!records_.reserve(k))
+            return fail(ErrorCode::OutOfMemory,
+                        fmt::format("The records that are loaded at the start have no room: contribution {} has {} "
+                                    "bytes of them, {} are free. Create the runtime with more records_bytes_max, or, "
+                                    "where light sets are to come and go, with load_records = false.",
+                                    k, records_.byteCount(k), records_.freeBytes()));
         queue.add(RecordQueue::no_light_set, k, records_);
     }
     std::vector<VkBufferCopy> regions;
@@ -128,26 +133,27 @@ Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Plann
     return {};
 }
 
-Expected<void> TexelBlender::createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+Expected<void> TexelBlender::createKernel(const VulkanContext& vulkan, ColorFormat format, const Planner& planner,
                                           std::span<const LightmapPages> page_sets) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
         pipelines.push_back(specialisationOf(group, format));
     std::vector<KernelBinding> bindings;
-    for (size_t i = 0; i < page_sets.size(); ++i)
-        bindings.insert(bindings.end(), {
-                                            KernelBinding::ofTexels(places_.view.get()),
-                                            KernelBinding::ofTexels(base_.view.get()),
-                                            KernelBinding::ofTexels(records_.view()),
-                                            KernelBinding::ofTexels(work_[i].items.view.get()),
-                                            KernelBinding::ofTexels(work_[i].terms.view.get()),
-                                            KernelBinding::ofTexels(batches_.view.get()),
-                                            KernelBinding::ofImage(page_sets[i].irradianceStorageView()),
-                                            KernelBinding::ofImage(page_sets[i].directionStorageView()),
-                                        });
-    auto kernel = Kernel::create(device, spirv::blend_texels_comp, bindings, sizeof(DispatchedItems), pipelines,
-                                 static_cast<uint32_t>(page_sets.size()));
+    for (const LightmapPages& pages : page_sets)
+        for (const Work& work : work_)
+            bindings.insert(bindings.end(), {
+                                                KernelBinding::ofTexels(places_.view.get()),
+                                                KernelBinding::ofTexels(base_.view.get()),
+                                                KernelBinding::ofTexels(records_.view()),
+                                                KernelBinding::ofTexels(work.items.view.get()),
+                                                KernelBinding::ofTexels(work.terms.view.get()),
+                                                KernelBinding::ofTexels(batches_.view.get()),
+                                                KernelBinding::ofImage(pages.irradianceStorageView()),
+                                                KernelBinding::ofImage(pages.directionStorageView()),
+                                            });
+    auto kernel = Kernel::create(vulkan, spirv::blend_texels_comp, bindings, sizeof(DispatchedItems), pipelines,
+                                 static_cast<uint32_t>(page_sets.size() * work_.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
@@ -159,14 +165,13 @@ uint64_t TexelBlender::deviceBytes() const {
     return bytes;
 }
 
-void TexelBlender::write(const Planner& planner, uint32_t page_set) {
+void TexelBlender::write(const Planner& planner, uint32_t list) {
     const WorkList& work = planner.work();
-    const Work& target = work_[page_set];
-    auto* items = reinterpret_cast<TexelItem*>(target.items.buffer.mapped);
+    auto* items = reinterpret_cast<TexelItem*>(work_[list].items.buffer.mapped);
     for (const WorkItem& item : work.items)
         *items++ = {item.batch | item.term_count << item_index_bits,
                     item.first_term | item.term_count >> 6 << item_index_bits};
-    auto* terms = reinterpret_cast<WorkTerm*>(target.terms.buffer.mapped);
+    auto* terms = reinterpret_cast<WorkTerm*>(work_[list].terms.buffer.mapped);
     for (const WorkTerm& term : work.terms)
         *terms++ = {records_.firstRecord(term.term), term.weight_r, term.weight_g, term.weight_b};
 }
@@ -193,12 +198,12 @@ uint32_t TexelBlender::dispatchGroup(VkCommandBuffer commands, const WorkList& w
     return dispatches;
 }
 
-uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const {
+uint32_t TexelBlender::dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const {
     const WorkList& work = planner.work();
     uint32_t dispatches = 0;
     for (uint32_t i = 0; i < work_group_count; ++i) {
         if (work.groups[i].item_count == 0) continue;
-        kernel_.bind(commands, i, page_set);
+        kernel_.bind(commands, i, target.set * static_cast<uint32_t>(work_.size()) + target.list);
         dispatches += dispatchGroup(commands, work, work.groups[i]);
     }
     return dispatches;

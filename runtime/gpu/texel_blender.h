@@ -22,14 +22,14 @@ class TexelBlender : public TexelExecutor {
                                          std::span<const LightmapPages> page_sets, Transfer& transfer,
                                          const RuntimeOptions& options);
 
-    void write(const Planner& planner, uint32_t page_set) override;
-    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const override;
+    void write(const Planner& planner, uint32_t list) override;
+    uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const override;
     uint64_t deviceBytes() const override;
     uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
     RecordStore* records() override { return &records_; }
 
    private:
-    // Written anew by the host for every update of a set of pages.
+    // Written anew by the host for every update that takes it.
     struct Work {
         TexelBuffer items, terms;
     };
@@ -37,14 +37,14 @@ class TexelBlender : public TexelExecutor {
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
     Expected<void> uploadRecords(const PackData& data, Transfer& transfer, bool all);
     Expected<void> createWork(const VulkanContext& vulkan, const Planner& planner);
-    Expected<void> createKernel(VkDevice device, ColorFormat format, const Planner& planner,
+    Expected<void> createKernel(const VulkanContext& vulkan, ColorFormat format, const Planner& planner,
                                 std::span<const LightmapPages> page_sets);
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 
     TexelBuffer places_, base_, batches_;
     RecordStore records_;
-    std::vector<Work> work_;  // per set of pages
+    std::vector<Work> work_;  // as many as updates may be on their way
     Kernel kernel_;
     uint32_t groups_x_max_ = 0;
     bool per_combination_ = false;  // a dispatch per cluster, as UBERBAKE's section 3.3 describes

@@ -18,8 +18,10 @@ Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vul
                                                         const PackData& data, const Planner& planner,
                                                         std::span<const LightmapPages> page_sets, Transfer& transfer) {
     const bool compares = options.mode == UpdateMode::Gather || options.mode == UpdateMode::Scatter;
-    if (compares && (page_sets.size() > 1 || !options.load_records || options.records_bytes_max > 0))
-        return fail(ErrorCode::Unsupported, "Modes gather and scatter update pages in place, with all records loaded.");
+    if (compares && (page_sets.size() > 1 || options.frames_in_flight > 1 || !options.load_records ||
+                     options.records_bytes_max > 0))
+        return fail(ErrorCode::Unsupported,
+                    "Modes gather and scatter update pages in place, one frame at a time, with all records loaded.");
     switch (options.mode) {
         case UpdateMode::Gather:
             return boxed(GatherBlender::create(vulkan, data, page_sets.front(), transfer));

@@ -11,15 +11,20 @@ namespace dimmer {
 
 class RecordStore;
 
+// Where an update writes, and which of the work lists it is carried out by.
+struct UpdateTarget {
+    uint32_t set = 0;  // of pages, or of probes
+    uint32_t list = 0;
+};
+
 class TexelExecutor {
    public:
     virtual ~TexelExecutor() = default;
 
-    // Copies the plan to the device's view of it: the dispatches of the previous one for these pages must have
-    // completed.
-    virtual void write(const Planner& planner, uint32_t page_set) = 0;
+    // Copies the plan to the device's view of it: the dispatches of the previous one in this list must have completed.
+    virtual void write(const Planner& planner, uint32_t list) = 0;
     // Records the dispatches, without barriers around them. Returns their number.
-    virtual uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, uint32_t page_set) const = 0;
+    virtual uint32_t dispatch(VkCommandBuffer commands, const Planner& planner, UpdateTarget target) const = 0;
 
     virtual uint64_t deviceBytes() const = 0;
     virtual uint32_t pipelineCount() const = 0;
@@ -27,8 +32,9 @@ class TexelExecutor {
     virtual RecordStore* records() { return nullptr; }
 };
 
-// Uploads what the mode needs (blocking), to write any of the given sets of pages. Unsupported where the device's
-// limits are too small for the pack, and for several sets in modes that are there to compare with.
+// Uploads what the mode needs (blocking), to write any of the given sets of pages, by as many work lists as updates may
+// be on their way. Unsupported where the device's limits are too small for the pack, and for several sets or lists in
+// modes that are there to compare with.
 Expected<std::unique_ptr<TexelExecutor>> createExecutor(const VulkanContext& vulkan, const RuntimeOptions& options,
                                                         const PackData& data, const Planner& planner,
                                                         std::span<const LightmapPages> page_sets, Transfer& transfer);

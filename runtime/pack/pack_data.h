@@ -41,7 +41,7 @@ struct Cluster {
     uint32_t first_term = 0, term_count = 0;  // terms ascend by contribution
 };
 
-// Up to 64 consecutive receivers of one cluster: the work of one workgroup.
+// Up to 64 consecutive receivers of one cluster: what kernels take as one item.
 struct Batch {
     uint32_t first_receiver = 0, receiver_count = 0;
 };

@@ -201,7 +201,7 @@ ModelSlots::ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_
       has_grid_(!data.probes.global.empty()),
       probes_max_(has_grid_ ? inGranules(std::min(probes_max, moving_probes_limit)) * probes_granule : 0),
       grid_box_{data.probes.global.start.min_m, data.probes.global.start.max_m},
-      pool_(probes_max_ / probes_granule),
+      pool_(itemsMax(), itemsMax()),
       dirty_counts_(page_sets) {
     if (probes_max_ == 0) return;
     cluster_boxes_ = boxesOfClusters(data);
@@ -293,7 +293,7 @@ void ModelSlots::place(Slot& slot, const Transform& transform) {
         for (size_t i = 0; i < 3; ++i) p[i] = corner >> i & 1 ? slot.grid.max_m[i] : slot.grid.min_m[i];
         extend(slot.box, clamped(transformed(transform, p), grid_box_));
     }
-    mark(slot, (1u << page_sets_) - 1);
+    mark(slot, allSets());
 }
 
 void ModelSlots::mark(Slot& slot, uint32_t sets) {
@@ -338,6 +338,12 @@ std::span<const ResampleItem> ModelSlots::take(uint32_t page_set) {
 void ModelSlots::rollback(uint32_t page_set) {
     for (Slot& slot : slots_)
         if (slot.taken & 1u << page_set) mark(slot, 1u << page_set);
+    items_.clear();
+}
+
+void ModelSlots::rollbackAll() {
+    for (Slot& slot : slots_)
+        if (slot.used) mark(slot, allSets());
     items_.clear();
 }
 

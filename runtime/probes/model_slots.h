@@ -43,7 +43,6 @@ class ModelSlots {
     Expected<void> move(Model model, const Transform& transform);
     Expected<void> remove(Model model);
     Expected<ModelSlot> slot(Model model) const;
-    uint32_t modelCount() const { return model_count_; }
     uint32_t probesMax() const { return probes_max_; }
     uint32_t itemsMax() const { return probes_max_ / probes_granule; }
 
@@ -54,6 +53,8 @@ class ModelSlots {
     std::span<const ResampleItem> take(uint32_t page_set);
     // What take() listed was not carried out.
     void rollback(uint32_t page_set);
+    // Nor, perhaps, anything that it ever listed.
+    void rollbackAll();
 
    private:
     // Models take whole granules, so that work lists have a size that fits all.
@@ -71,6 +72,7 @@ class ModelSlots {
     Expected<uint32_t> find(Model model) const;
     void place(Slot& slot, const Transform& transform);
     void mark(Slot& slot, uint32_t sets);
+    uint32_t allSets() const { return (1u << page_sets_) - 1; }
     static uint32_t inGranules(uint32_t probes) { return (probes + probes_granule - 1) / probes_granule; }
     static uint32_t granules(const ModelGrid& grid) { return inGranules(grid.probeCount()); }
 

@@ -213,7 +213,7 @@ Expected<ModelSlot> LightState::modelSlot(Model model) const {
     return models_->slot(model);
 }
 
-// A handle of another pack has no weight here; 0 is the harmless answer.
+// A handle of no such element has no weight; 0 is the harmless answer.
 Weight LightState::weight(LightSet set) const {
     return checkHandle(pack_.elements(), ElementKind::LightSet, set.element) ? planner().element(set.element) : 0.0f;
 }

@@ -344,15 +344,26 @@ bool Planner::finishPlan() {
     return stats_.batches > 0;
 }
 
-void Planner::rollback() {
-    for (const Part& part : parts_) {
-        waitWhole(part.cluster);
-        waiting_[part.cluster].quanta = plain_quanta;  // a limit chose it for being visible
-    }
+void Planner::writeAnew(uint32_t cluster) {
+    waitWhole(cluster);
+    waiting_[cluster].quanta = plain_quanta;  // a limit chose it for being visible
+}
+
+void Planner::forgetPlan() {
     starts_over_ = true;  // the weights of a plan that never ran are no state to go on with
     parts_.clear();
     work_ = {};
     stats_ = {};
+}
+
+void Planner::rollback() {
+    for (const Part& part : parts_) writeAnew(part.cluster);
+    forgetPlan();
+}
+
+void Planner::rollbackAll() {
+    for (uint32_t cluster = 0; cluster < receivers_.clusters.size(); ++cluster) writeAnew(cluster);
+    forgetPlan();
 }
 
 }  // namespace dimmer

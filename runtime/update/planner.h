@@ -72,6 +72,8 @@ class Planner {
     // The last plan that had anything to do was not executed, or nobody knows: what it would have written is written by
     // the next plan(), whatever the weights are then.
     void rollback();
+    // The same of every plan that there was: the next plan() writes all clusters.
+    void rollbackAll();
 
     // Whether batches wait, as the last plan was limited.
     bool waiting() const { return !waiting_clusters_.empty(); }
@@ -127,6 +129,8 @@ class Planner {
     template <class Visit>
     void visitMarked(Visit&& visit);
     void waitWhole(uint32_t cluster);
+    void writeAnew(uint32_t cluster);
+    void forgetPlan();
     float quantaPutOff(const Cluster& cluster) const;
     void touchAllPutOff();
     bool finishPlan();

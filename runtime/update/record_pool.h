@@ -1,4 +1,4 @@
-// Ranges of one buffer, handed out and taken back.
+// Ranges of one buffer, handed out and taken back; neither allocates.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +10,10 @@ namespace dimmer {
 class RecordPool {
    public:
     RecordPool() = default;
-    explicit RecordPool(uint64_t size) {
+    // `ranges_max`: how many are handed out at a time, at most. Between them lie one more that are free, and while one
+    // comes back it is another.
+    RecordPool(uint64_t size, size_t ranges_max) {
+        free_.reserve(ranges_max + 2);
         if (size > 0) free_.push_back({0, size});
     }
 

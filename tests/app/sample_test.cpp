@@ -1,7 +1,7 @@
 // `dimmer sample`: points in, lux out.
 #include <app/tool_fixture.h>
 #include <fmt/format.h>
-#include <gpu/headless_device.h>
+#include <tools/headless_device.h>
 
 #include <cmath>
 

@@ -3,9 +3,9 @@
 #include <app/tool_fixture.h>
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
-#include <gpu/headless_device.h>
 #include <pack/sample_pack.h>
 #include <runtime/gpu_fixture.h>
+#include <tools/headless_device.h>
 #include <write/pack_writer.h>
 
 #include <map>

@@ -257,12 +257,15 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     const uint32_t *own_irradiance, *own_direction;
     size_t own_count;
     int failed;
+    const dimmer_vulkan_options unknown = {(dimmer_buffering)2, 0, 0}, many = {DIMMER_IN_PLACE, 0, 9};
     uint32_t* by_submit = malloc(8 * texel_count);
     EXPECT(by_submit != NULL);
     EXPECT_OK(dimmer_pack_open(path, &pack));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2 is no dimmer_buffering",
-                   dimmer_lights_create_vulkan(pack, vulkan, (dimmer_buffering)2, 0, &lights));
-    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_IN_PLACE, 0, &lights));
+                   dimmer_lights_create_vulkan(pack, vulkan, &unknown, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "frames_in_flight is 9",
+                   dimmer_lights_create_vulkan(pack, vulkan, &many, &lights));
+    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, NULL, &lights));
     EXPECT_OK(dimmer_lights_get_probe_buffers(lights, &probes, &grid_table));
     EXPECT(probes == VK_NULL_HANDLE && grid_table == VK_NULL_HANDLE);
     if ((failed = set_state(pack, lights)) != 0) return failed;
@@ -282,12 +285,21 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     EXPECT_OK(dimmer_lights_apply(lights, "all=0"));
     EXPECT_OK(dimmer_lights_submit_after(lights, semaphore, value, NULL));
     EXPECT_OK(dimmer_lights_wait(lights, NULL));
-    EXPECT_OK(dimmer_lights_discard_recorded(lights)); /* nothing was */
+    EXPECT_FAILURE(DIMMER_NOT_FOUND, "no recording", dimmer_lights_discard_recorded(lights));
     if ((failed = set_state(pack, lights)) != 0) return failed;
     if ((failed = update_by_recording(vulkan, lights)) != 0) return failed;
     EXPECT_OK(dimmer_lights_read_pages(lights, irradiance, direction, texel_count));
     EXPECT(memcmp(by_submit, irradiance, 4 * texel_count) == 0);
     EXPECT(memcmp(by_submit + texel_count, direction, 4 * texel_count) == 0);
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "tolerance", dimmer_lights_set_limits(lights, 0, -1));
+    EXPECT_OK(dimmer_lights_set_limits(lights, 64, 0));
+    EXPECT_OK(dimmer_lights_apply(lights, "all=0.5"));
+    EXPECT_OK(dimmer_lights_submit(lights, &stats));
+    EXPECT(stats.receivers > 0 && stats.receivers <= 64);
+    EXPECT_OK(dimmer_lights_invalidate(lights));
+    EXPECT_OK(dimmer_lights_set_limits(lights, 0, 0));
+    EXPECT_OK(dimmer_lights_submit(lights, &stats));
+    EXPECT(stats.receivers > 64);
     free(by_submit);
     dimmer_lights_destroy(lights);
     dimmer_pack_close(pack);
@@ -297,10 +309,13 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
 int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan) {
     dimmer_pack* pack = NULL;
     dimmer_lights* lights = NULL;
-    VkBuffer probes[3] = {VK_NULL_HANDLE}, tables[3] = {VK_NULL_HANDLE};
+    VkBuffer probes[3] = {VK_NULL_HANDLE}, tables[3] = {VK_NULL_HANDLE}, of_set = VK_NULL_HANDLE;
+    const dimmer_vulkan_options twice = {DIMMER_DOUBLE_BUFFERED, 0, 2};
+    dimmer_images now, images;
+    uint32_t page_set = 9, probe_set = 9;
     int i;
     EXPECT_OK(dimmer_pack_open(path, &pack));
-    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, DIMMER_DOUBLE_BUFFERED, 0, &lights));
+    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, &twice, &lights));
     for (i = 0; i < 3; ++i) {
         EXPECT_OK(dimmer_lights_apply(lights, i % 2 ? "all=0.5" : "all=0.25"));
         EXPECT_OK(dimmer_lights_submit(lights, NULL));
@@ -309,6 +324,16 @@ int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan) {
         EXPECT(probes[i] != VK_NULL_HANDLE && tables[i] != VK_NULL_HANDLE && tables[i] == tables[0]);
     }
     EXPECT(probes[1] != probes[0] && probes[2] == probes[0]);
+    EXPECT_OK(dimmer_lights_get_sets(lights, &page_set, &probe_set));
+    EXPECT_OK(dimmer_lights_get_probes_of_set(lights, probe_set, &of_set));
+    EXPECT(of_set == probes[2]);
+    EXPECT_OK(dimmer_lights_get_probes_of_set(lights, probe_set ^ 1, &of_set));
+    EXPECT(of_set == probes[1]);
+    EXPECT_OK(dimmer_lights_get_images(lights, &now));
+    EXPECT_OK(dimmer_lights_get_images_of_set(lights, page_set, &images));
+    EXPECT(images.irradiance == now.irradiance && images.sampler != VK_NULL_HANDLE);
+    EXPECT_FAILURE(DIMMER_NOT_FOUND, "no set of pages 2", dimmer_lights_get_images_of_set(lights, 2, &images));
+    EXPECT_FAILURE(DIMMER_NOT_FOUND, "no set of probes 2", dimmer_lights_get_probes_of_set(lights, 2, &of_set));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_get_probe_buffers(lights, probes, NULL));
     dimmer_lights_destroy(lights);
     dimmer_pack_close(pack);

@@ -100,7 +100,8 @@ dimmer_vulkan vulkanOf(const VulkanContext& context) {
             .queue_family = context.queue_family,
             .compute_queue = VK_NULL_HANDLE,
             .compute_queue_family = 0,
-            .get_instance_proc_addr = countingLoader};
+            .get_instance_proc_addr = countingLoader,
+            .pipeline_cache = VK_NULL_HANDLE};
 }
 
 TEST_F(CInterfaceGpu, BlendsByVulkan) {

@@ -1,4 +1,5 @@
 #include <dimmer/cpu_runtime.h>
+#include <dimmer/door.h>
 #include <dimmer/runtime.h>
 
 #include <cstdio>
@@ -17,5 +18,8 @@ int main() {
     const auto refused = lights.addModel({}, nowhere);
     if (refused || refused.error().code != dimmer::ErrorCode::InvalidArgument) return 1;
     std::printf("%s\n", refused.error().message.c_str());
+    const float no_angle = dimmer::hingedDoorWeight(std::numeric_limits<float>::quiet_NaN(), 1.5f);
+    const auto door = lights.pack().elements().size() - 1;
+    if (lights.setDoor(dimmer::Door{static_cast<uint32_t>(door)}, no_angle)) return 1;
     return 0;
 }

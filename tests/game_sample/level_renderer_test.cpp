@@ -4,9 +4,9 @@
 #include <game_sample/level_renderer.h>
 #include <game_sample/model_renderer.h>
 #include <game_sample/player.h>
-#include <gpu/headless_device.h>
 #include <gtest/gtest.h>
 #include <probes/tetrahedra.h>
+#include <tools/headless_device.h>
 
 #include <fstream>
 #include <glm/gtc/packing.hpp>

@@ -160,25 +160,39 @@ TEST(WorkerPoolDeathTest, WithoutMemoryTheCallerWorksAlone) {
     EXPECT_EXIT(workWithoutMemory(), testing::ExitedWithCode(0), "");
 }
 
-// Texels, probes and a model, on threads: an update that takes memory would throw, and leave its work undone.
+std::vector<Model> addModels(LightState& lights) {
+    std::vector<Model> models;
+    for (int i = 0; i < 7; ++i) models.push_back(lights.addModel({}, {}).value());
+    return models;
+}
+
+// In an order that leaves free ranges between others.
+void removeAllButTheLast(LightState& lights, std::span<const Model> models) {
+    for (const size_t i : {0, 2, 4, 5, 3, 1}) lights.removeModel(models[i]).value();
+}
+
+// Texels, probes and models, on threads: an update or a removal that takes memory would throw, and leave its work
+// undone.
 [[noreturn]] void updateWithoutMemory() {
     PackData data = test::modelPack(3, 100, [](glm::vec3) { return glm::vec3(0.1f); });
     test::addLightOnProbes(data, 0, encodeE5B9G9R9(1, 1, 1), [](glm::vec3) { return true; });
     const Pack pack = packOf(std::move(data));
     const Pack large = packOf(test::randomPack(3, {.clusters = 2000, .page_count = 4, .page_side = 512}));
-    CpuRuntime grid(pack, 4, 64), wanted_grid(pack, 1, 64);
+    CpuRuntime grid(pack, 4, 64), wanted_grid(pack, 1, 64);  // room for 8 models of 8 probes
     CpuRuntime texels(large, 4), wanted_texels(large);
-    const bool added = grid.addModel({}, {}) && wanted_grid.addModel({}, {});
+    const auto models = addModels(grid), wanted_models = addModels(wanted_grid);
+    removeAllButTheLast(wanted_grid, wanted_models);
     wanted_grid.update();
     wanted_texels.update();
     takeAllMemory();
     const bool all_threads = texels.update().batches >= 4 * 256;  // fewer would be left to one
+    removeAllButTheLast(grid, models);
     const bool resampled = grid.update().probes_resampled == 8;
     const bool same = std::ranges::equal(texels.irradiancePages(), wanted_texels.irradiancePages()) &&
                       std::ranges::equal(texels.directionPages(), wanted_texels.directionPages()) &&
                       std::ranges::equal(grid.irradiancePages(), wanted_grid.irradiancePages()) &&
                       std::ranges::equal(grid.probes(), wanted_grid.probes());
-    std::_Exit(added && all_threads && resampled && same ? 0 : 2);
+    std::_Exit(all_threads && resampled && same ? 0 : 2);
 }
 
 TEST(WorkerPoolDeathTest, WithoutMemoryUpdatesDoAllTheirWork) {

@@ -1,8 +1,8 @@
 // A Vulkan device with validation for tests. Any message of the layers fails the test during which it came.
 #pragma once
 
-#include <gpu/headless_device.h>
 #include <gtest/gtest.h>
+#include <tools/headless_device.h>
 
 #include <optional>
 

@@ -15,7 +15,7 @@ using test::packOf;
 using testing::HasSubstr;
 
 TEST(RecordPool, HandsOutWhatIsFreeAndJoinsWhatComesBack) {
-    RecordPool pool(100);
+    RecordPool pool(100, 100);
     EXPECT_EQ(pool.allocate(30), 0u);
     EXPECT_EQ(pool.allocate(30), 30u);
     EXPECT_EQ(pool.allocate(40), 60u);
@@ -32,7 +32,7 @@ TEST(RecordPool, HandsOutWhatIsFreeAndJoinsWhatComesBack) {
 // No two ranges overlap, and all that came back can be had again, whatever the order.
 TEST(RecordPool, RandomHistoriesNeverOverlap) {
     test::Random random(1);
-    RecordPool pool(1000);
+    RecordPool pool(1000, 1000);
     std::vector<bool> taken(1000);
     std::vector<std::pair<uint64_t, uint64_t>> held;
     for (int step = 0; step < 5000; ++step) {

@@ -27,7 +27,7 @@ extern "C" {
 typedef enum dimmer_result {
     DIMMER_OK = 0,
     DIMMER_INVALID_ARGUMENT = 1, /* the caller's value is out of its range */
-    DIMMER_NOT_FOUND = 2,        /* no light set, door or index of that name or number */
+    DIMMER_NOT_FOUND = 2,        /* no light set or door of that name, or nothing of that number to give */
     DIMMER_BAD_INPUT = 3,        /* a file's content cannot be used */
     DIMMER_UNSUPPORTED = 4,      /* the device or this build lacks something that is needed */
     DIMMER_OUT_OF_MEMORY = 5,    /* host or device memory */
@@ -171,12 +171,16 @@ void dimmer_lights_destroy(dimmer_lights* lights);
 
 /* Changes cost nanoseconds and take effect with the next update. At the start every light set is at 1 (or its maximum,
  * where that is smaller) and every door is closed. A weight is 0 .. max_weight, per channel where it has three;
- * `open` is 0 (closed) .. 1 (open). */
+ * `open` is 0 (closed) .. 1 (open). An element that is no light set, or no door, is DIMMER_INVALID_ARGUMENT. */
 dimmer_result dimmer_lights_set_weight(dimmer_lights* lights, uint32_t light_set, float weight);
 dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light_set, float r, float g, float b);
 dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open);
 /* Many at once, as text: "all=0,hall=0.5,alarm=1/0.2/0.2,door:front=1". */
 dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state);
+/* What an update may leave for later: at most so many texels are written (0: all; the most visible come first), and
+ * what is less than so many steps of the format from what was last written waits (0: nothing does). {0, 0} brings the
+ * exact state with the next update. Probes and models are not limited. */
+dimmer_result dimmer_lights_set_limits(dimmer_lights* lights, uint32_t receivers_max, float tolerance_quanta);
 /* As set last: of a door, `open` in all three. */
 dimmer_result dimmer_lights_get_weight(const dimmer_lights* lights, uint32_t element, float rgb[3]);
 
@@ -263,6 +267,7 @@ typedef struct dimmer_vulkan {
      * that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names of the
      * functions. The functions are the process's: all lights that live at one time need the same ones. */
     PFN_vkGetInstanceProcAddr get_instance_proc_addr;
+    VkPipelineCache pipeline_cache; /* optional: create makes its pipelines with it */
 } dimmer_vulkan;
 
 typedef enum dimmer_buffering {
@@ -270,31 +275,40 @@ typedef enum dimmer_buffering {
     DIMMER_DOUBLE_BUFFERED = 1 /* two sets of pages and of probes that take turns; twice the memory for both */
 } dimmer_buffering;
 
-/* DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue may be), a queue family that the device does not have, or
- * one without compute; a `buffering` that is none. DIMMER_UNSUPPORTED: a device below Vulkan 1.2, or one without a
- * format or limit that the pack needs; a loader without a function of Vulkan 1.2, or another one than lights have that
- * live. */
+/* All 0 is the default. */
+typedef struct dimmer_vulkan_options {
+    dimmer_buffering buffering;
+    uint32_t moving_probes_max; /* room for so many probes of models that move */
+    uint32_t frames_in_flight;  /* updates that may be on their way at a time, 1 to 8; 0 is 1 */
+} dimmer_vulkan_options;
+
+/* `options`: may be null. DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue and pipeline_cache may be), a
+ * queue family that the device does not have, or one without compute; options out of their range. DIMMER_UNSUPPORTED: a
+ * device below Vulkan 1.2, or one without a format or limit that the pack needs; a loader without a function of
+ * Vulkan 1.2, or another one than lights have that live. */
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,
-                                          dimmer_buffering buffering, uint32_t moving_probes_max,
-                                          dimmer_lights** lights);
+                                          const dimmer_vulkan_options* options, dimmer_lights** lights);
 
 /* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
 
 /* Records the update into the caller's command buffer, outside a render pass, with the barriers that let fragment and
  * compute shaders sample afterwards. The command buffer must be of `queue_family`, and be submitted to `queue`, once.
  * Its compute pipeline, compute descriptor sets and push constants are others afterwards. Nothing changed: nothing is
- * recorded (0 dispatches). With work, it first blocks until what dimmer_lights_submit() sent is done. A call that
- * records overwrites what the last recording's commands read: their submission must have completed, and the fence of
- * two frames ago does not say that. With several frames in flight, use dimmer_lights_submit(). */
+ * recorded (0 dispatches). A call that records overwrites what the commands of `frames_in_flight` updates ago read:
+ * their submission must have completed, as the fence of so many frames ago says; where dimmer_lights_submit() made it,
+ * the call blocks until then. */
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
 /* What the last call that found work recorded will never run (a frame was given up): the next update does its work.
- * Calls that found nothing to do may have come since. Where dimmer_lights_submit() found work since, or it was taken
- * back already, nothing happens. Of several recordings only the last can be taken back. */
+ * Calls that found nothing to do may have come since. DIMMER_NOT_FOUND where dimmer_lights_submit() found work since,
+ * or it was taken back already. Of several recordings only the last can be taken back; dimmer_lights_invalidate() makes
+ * up for others. */
 dimmer_result dimmer_lights_discard_recorded(dimmer_lights* lights);
+/* Nobody knows which updates ran: the next ones write all that any could have written. */
+dimmer_result dimmer_lights_invalidate(dimmer_lights* lights);
 
-/* The same with a command buffer of its own. Returns at once; the lights' semaphore tells when it is done. A later call
- * with work blocks until the earlier one's update is done, but does not wait for what was recorded, which must have
- * completed. */
+/* The same with a command buffer of its own. Returns at once, but with work while `frames_in_flight` earlier ones are
+ * under way; the lights' semaphore tells when it is done. It does not wait for what was recorded, of which the same
+ * must have completed as before dimmer_lights_record(), and all where it has a queue of its own. */
 dimmer_result dimmer_lights_submit(dimmer_lights* lights, dimmer_update_stats* stats);
 /* The same, once `semaphore` (null: nothing) has `value`: with a queue of its own an update must wait for the frames
  * that read what it writes, pages or probes: in place what dimmer_lights_get_images() and
@@ -327,6 +341,13 @@ dimmer_result dimmer_lights_get_probe_buffers(const dimmer_lights* lights, VkBuf
 /* What to sample after the last update; with DIMMER_DOUBLE_BUFFERED, ask after each, even after one of 0 dispatches:
  * where the other set of pages held the state already, it is shown without a recording. */
 dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_images* images);
+
+/* With DIMMER_DOUBLE_BUFFERED pages and probes have two sets each, 0 and 1, that never change: descriptors are written
+ * once for each. dimmer_lights_get_sets() tells after each update which to bind; the two numbers need not be the same.
+ * The next update writes the other sets. In place there is set 0. DIMMER_NOT_FOUND for other numbers. */
+dimmer_result dimmer_lights_get_sets(const dimmer_lights* lights, uint32_t* page_set, uint32_t* probe_set);
+dimmer_result dimmer_lights_get_images_of_set(const dimmer_lights* lights, uint32_t page_set, dimmer_images* images);
+dimmer_result dimmer_lights_get_probes_of_set(const dimmer_lights* lights, uint32_t probe_set, VkBuffer* probes);
 
 #endif
 

@@ -1,29 +1,16 @@
 // From how far a door stands open to the weight that LightState::setDoor takes: the share of the opening that light can
-// pass. Defaults for the two common kinds; a game may use any curve of its own.
+// pass. Defaults for the two common kinds; a game may use any curve of its own. Thread-safe. Not inline: under a game's
+// -ffast-math, NaN would open doors.
 #pragma once
-
-#include <algorithm>
-#include <cmath>
 
 namespace dimmer {
 
 // A hinged leaf: the width that a leaf turned by `angle_rad` no longer covers, (1 - cos a) / (1 - cos a_max), clamped
 // to 0..1. `angle_max_rad`: where the door counts as open, up to pi; at or below 0, every angle above 0 is open. Where
 // either is NaN so is the weight, which setDoor refuses.
-inline float hingedDoorWeight(float angle_rad, float angle_max_rad) {
-    constexpr float half_turn_rad = 3.14159265f;
-    const float half_angle = 0.5f * std::min(std::abs(angle_rad), half_turn_rad);
-    const float half_max = 0.5f * std::min(angle_max_rad, half_turn_rad);
-    if (half_max <= 0) return half_angle > 0 ? 1.0f : half_angle;
-    // 1 - cos a = 2 sin^2(a / 2): cosines of small angles are 1 to the last bit.
-    const float share = std::sin(half_angle) / std::sin(half_max);
-    return std::min(share * share, 1.0f);  // in this order: std::min(1, NaN) would be 1
-}
+float hingedDoorWeight(float angle_rad, float angle_max_rad);
 
 // A sliding or lifting leaf: travel / width (height), clamped to 0..1. `width_m`: the travel at which it is open.
-inline float slidingDoorWeight(float travel_m, float width_m) {
-    if (!(width_m > 0)) return travel_m > 0 ? 1.0f : 0.0f;
-    return std::clamp(travel_m / width_m, 0.0f, 1.0f);
-}
+float slidingDoorWeight(float travel_m, float width_m);
 
 }  // namespace dimmer

@@ -16,8 +16,9 @@ namespace dimmer {
 class ModelSlots;
 class Planner;
 
-// Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack. One that came
-// from no look-up is refused.
+// Handles: look a name up once, then pass the handle. They are valid for every runtime of the same pack: the index of
+// the light set or door in Pack::elements(), as which a mesh or a model names it too. One of another kind, or of no
+// element, is refused; one of another pack cannot be told.
 struct LightSet {
     uint32_t element = std::numeric_limits<uint32_t>::max();
 };

@@ -26,11 +26,13 @@ struct VulkanContext {
     // engine that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names
     // of the functions. The functions are the process's: all runtimes that live at one time need the same ones.
     PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
+    // Optional: create() makes its pipelines, up to 25 small ones, with it. Synchronised as it was made to be.
+    VkPipelineCache pipeline_cache = VK_NULL_HANDLE;
 };
 
 // How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
 enum class UpdateMode {
-    WorkList,        // one dispatch per number of contributions that are on
+    WorkList,        // one dispatch per number of contributions that are on; 9 to 12 are one, 13 to 16, and all above
     PerCombination,  // one dispatch per changed cluster
     Gather,          // a list of records per texel; all texels whenever anything changed
     Scatter,         // one pass per contribution over 32-bit sums; all texels whenever anything changed
@@ -46,6 +48,9 @@ enum class Buffering {
 struct RuntimeOptions {
     UpdateMode mode = UpdateMode::WorkList;
     Buffering buffering = Buffering::InPlace;
+    // Updates that may be on their way at a time, 1 to 8: work lists for so many, which are a few per cent of the
+    // pack's bytes. A game with two frames in flight that record()s asks for 2.
+    uint32_t frames_in_flight = 1;
     // Device memory for texels' records, in bytes; 0: room for all. Less needs load_records = false: then light sets
     // are loaded and dropped as the game moves on.
     uint64_t records_bytes_max = 0;
@@ -98,11 +103,11 @@ struct DeviceFootprint {
 // Not thread-safe; external synchronisation of the queue is the caller's, as in Vulkan itself.
 class Runtime : public LightState {
    public:
-    // Uploads the pack's records and the base pages (blocking). Device memory: what `dimmer inspect` states.
+    // Uploads the pack's records and the base pages (blocking). Device memory: footprint().
     // InvalidArgument: a null handle (only compute_queue may be), a queue family that the device does not have, or one
-    // without compute. Unsupported: a device below Vulkan 1.2, or without a format or limit that the pack needs; a
-    // loader without a function of Vulkan 1.2, or another one than a runtime has that lives.
-    // Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
+    // without compute; frames_in_flight out of range. Unsupported: a device below Vulkan 1.2, or without a format or
+    // limit that the pack needs; a loader without a function of Vulkan 1.2, or another one than a runtime has that
+    // lives. Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
     // Waits for what submit() and continueLoading() sent, and for nothing else. Of the caller's submissions those must
     // have completed before that have a record()ed update in them, read pages, probes or gridTable(), or wait for
@@ -121,27 +126,30 @@ class Runtime : public LightState {
     // compute shaders alone on compute_queue; other stages need a barrier of the caller's before and after, other
     // queues semaphores: SubmitWait, or a wait of the submission that has the recording.
 
-    // Records the update into the caller's command buffer, outside a render pass: one dispatch per number of
-    // contributions that are on, with the barriers that let fragment and compute shaders sample afterwards. The command
-    // buffer must be of VulkanContext::queue_family, and be submitted to VulkanContext::queue, once. Its compute
-    // pipeline, compute descriptor sets and push constants are others afterwards. Nothing changed: records nothing (0
-    // dispatches). With work, it first blocks until what submit() sent is done. A call that records overwrites the work
-    // lists that the last recording's commands read, so that one's submission must have completed on the GPU. The fence
-    // of two frames ago does not say that: with several frames in flight, submit() is the way. Buffering::Double has
-    // work lists for each set, and a call writes the sets pageSet() ^ 1 and probeSet() ^ 1, as they were before it: the
-    // last recording that wrote either must have completed. That may be the last one of all: under limits, or after
-    // sets changed places without a recording (see images()).
+    // Records the update into the caller's command buffer, outside a render pass: a few dispatches (UpdateMode), with
+    // the barriers that let fragment and compute shaders sample afterwards. The command buffer must be of
+    // VulkanContext::queue_family, and be submitted to VulkanContext::queue, once. Its compute pipeline, compute
+    // descriptor sets and push constants are others afterwards. Nothing changed: records nothing (0 dispatches). A call
+    // that records overwrites the work list of the update frames_in_flight updates ago: where record() made that, its
+    // submission must have completed on the GPU (idle calls do not count, so that the fence of frames_in_flight frames
+    // ago says so); where submit() did, the call blocks until it has, and where submit() has another queue, until all
+    // that it sent has.
     Expected<UpdateStats> record(VkCommandBuffer commands);
     // The commands of the last record() that found work will never run (a frame was given up): the next update does
     // their work. Calls of record() and submit() that found nothing to do may have come since. Where submit() found
-    // work since, or it was taken back already, nothing happens. Of several recordings only the last can be taken back.
-    void discardRecorded();
+    // work since, or it was taken back already, nothing happens, and it says false. Of several recordings only the last
+    // can be taken back; invalidate() makes up for others.
+    bool discardRecorded();
+    // Nobody knows which updates ran: the next ones write all that any could have written. As expensive as a change of
+    // every light set, of both sets with Buffering::Double.
+    void invalidate();
 
     // The same on the context's compute queue, or its queue where it has none, with a command buffer of the runtime's
-    // own. Returns at once, but for a call with work while the earlier update is still under way: it blocks until that
-    // one is done. It does not wait for what was record()ed, which must have completed. Nothing changed: no submission,
-    // no wait, and `wait` is not waited for. Where the pages or probes to write were read on another queue, `wait` must
-    // say when that is done: Double, the last frame that read images(pageSet() ^ 1) or probes(probeSet() ^ 1).
+    // own. Returns at once, but for a call with work while as many earlier ones as frames_in_flight are under way: it
+    // blocks until the first of them is done. It does not wait for what was record()ed, of which the same must have
+    // completed as before a record(), and all where it has another queue. Nothing changed: no submission, no wait, and
+    // `wait` is not waited for. Where the pages or probes to write were read on another queue, `wait` must say when
+    // that is done: Double, the last frame that read images(pageSet() ^ 1) or probes(probeSet() ^ 1).
     Expected<UpdateStats> submit(const SubmitWait& wait = {});
     // The timeline semaphore of submit() and the value that its last submission signals; 0 before the first.
     VkSemaphore semaphore() const;
@@ -155,10 +163,15 @@ class Runtime : public LightState {
     // completed where submit() has another queue; or it never runs (discardRecorded()). Unsupported in modes gather and
     // scatter.
     Expected<void> dropRecords(LightSet set);
-    // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room.
+    // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room:
+    // it takes a free range of records_bytes_max for each of the set's contributions, so that what is free may be in
+    // too many pieces.
     // Loaded, the set is at 0 and takes any weight.
     Expected<void> loadRecords(LightSet set);
     RecordsState recordsState(LightSet set) const;
+    // Of the memory for texels' records: what a light set's take, and what no set's do. 0 in modes gather and scatter.
+    uint64_t recordBytes(LightSet set) const;
+    uint64_t freeRecordBytes() const;
     // Copies the next piece, of at most so many bytes (and 4 MiB), and returns at once; while the last piece is under
     // way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while it
     // loads.
@@ -170,6 +183,7 @@ class Runtime : public LightState {
     LightmapImages images() const { return images(pageSet()); }
     LightmapImages images(uint32_t page_set) const;
     uint32_t pageSet() const;
+    uint32_t setCount() const;  // 1 or 2; of what never changes both are one
     // The light probes, by their number, 7 words each (see runtime/format/probe.h): a storage buffer, with those of
     // models behind the pack's. Null where there are none. Shaders read it by grid.glsl. Buffering::Double: of two
     // sets, probeSet() is the one to read after the last update; limits are of pages alone, so the two part ways.
@@ -177,7 +191,8 @@ class Runtime : public LightState {
     uint32_t probeSet() const;
     // The global light grid's tables for grid.glsl, a storage buffer; null where the pack has no such grid.
     VkBuffer gridTable() const;
-    // In mode WorkList: the device memory that `dimmer inspect` states. A level without a light set or door that
+    // In mode WorkList, with pages in place, one frame in flight, all records and no moving probes: the device memory
+    // that `dimmer inspect` states. A level without a light set or door that
     // changes anything has its pages, and its light grid's probes and tables, and nothing else.
     DeviceFootprint footprint() const;
 

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
-#include <gpu/headless_device.h>
 #include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 #include <gpu/vulkan_functions.h>
+#include <tools/headless_device.h>
 
 #include <algorithm>
 #include <mutex>

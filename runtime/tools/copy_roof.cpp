@@ -1,4 +1,4 @@
-#include <gpu/copy_roof.h>
+#include <tools/copy_roof.h>
 
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
@@ -126,7 +126,7 @@ Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
     const KernelBinding bindings[] = {
         KernelBinding::ofTexels(source_.view.get()), KernelBinding::ofBuffer(target_.buffer.get()),
         KernelBinding::ofImage(pages_[0].view.get()), KernelBinding::ofImage(pages_[1].view.get())};
-    auto kernel = Kernel::create(vulkan.device, spirv::copy_roof_comp, bindings, sizeof(Constants), pipelines);
+    auto kernel = Kernel::create(vulkan, spirv::copy_roof_comp, bindings, sizeof(Constants), pipelines);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};
