@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <numeric>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -18,6 +20,8 @@ namespace {
 // Planes and lines are told apart at these steps: finer than any texel, coarser than 32-bit coordinates at 100 m.
 constexpr float normal_steps = 512, offset_steps_per_m = 128, direction_steps = 2048;
 constexpr float touching_m = 1e-3f;
+// Of the directions of edges, in a quarter of a turn.
+constexpr int edge_directions = 360;
 // Bilinear filtering and padding reach this far.
 constexpr float filter_reach_texels = 2;
 // A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
@@ -45,6 +49,13 @@ struct Axes {
         const glm::vec3 reference = std::abs(n.y) > 0.9f ? glm::vec3(0, 0, -1) : glm::vec3(0, 1, 0);
         u = glm::normalize(glm::cross(reference, n));
         v = glm::cross(n, u);
+    }
+    // With `along` of these axes as the first one.
+    Axes turned(glm::vec2 along) const {
+        Axes axes = *this;
+        axes.u = glm::normalize(along.x * u + along.y * v);
+        axes.v = glm::normalize(along.x * v - along.y * u);
+        return axes;
     }
     glm::vec2 on(glm::vec3 p) const { return {glm::dot(p, u), glm::dot(p, v)}; }
 };
@@ -78,10 +89,10 @@ void keepApart(Apart& apart, uint32_t a, uint32_t b) {
 // Charts of one plane: a union-find over its faces.
 class PlaneGrouper {
    public:
-    PlaneGrouper(std::span<const PlanarFace> all, std::vector<uint32_t> ids, uint32_t side_max_texels)
+    PlaneGrouper(std::span<const PlanarFace> all, std::vector<uint32_t> ids, const Axes& axes, uint32_t side_max_texels)
         : all_(all),
           ids_(std::move(ids)),
-          axes_(all[ids_[0]].normal),
+          axes_(axes),
           density_(all[ids_[0]].texels_per_metre),
           side_max_(static_cast<float>(side_max_texels) / density_) {
         for (uint32_t id : ids_) {
@@ -112,7 +123,56 @@ class PlaneGrouper {
         return out;
     }
 
+    // Faces that hang together and whose edges lie along other axes than these: a building that is turned. Each with
+    // the axes that are theirs. What walls stand on is cut along a chart's axes alone (wall_cuts.h).
+    std::vector<std::pair<Axes, std::vector<uint32_t>>> turned() {
+        parent_.resize(ids_.size());
+        std::iota(parent_.begin(), parent_.end(), 0u);
+        for (const Contact& c : contacts_) parent_[find(c.a)] = find(c.b);
+        std::map<uint32_t, std::vector<uint32_t>> parts;
+        for (uint32_t i = 0; i < ids_.size(); ++i) parts[find(i)].push_back(i);
+        std::vector<std::pair<Axes, std::vector<uint32_t>>> found;
+        for (auto& [root, part] : parts) {
+            const auto along = alongEdges(part);
+            if (!along) continue;
+            for (uint32_t& i : part) i = ids_[i];
+            found.emplace_back(axes_.turned(*along), std::move(part));
+        }
+        return found;
+    }
+
    private:
+    // The direction, up to right angles, that most of these faces' outer edges have, by length (a square's diagonals
+    // are as good as its sides); empty where that is less than twice as much as lies along the axes.
+    std::optional<glm::vec2> alongEdges(std::span<const uint32_t> part) const {
+        using Edge = std::array<float, 4>;
+        const auto edge = [&](uint32_t i, size_t from, size_t to) {
+            return Edge{flat_[i][from].x, flat_[i][from].y, flat_[i][to].x, flat_[i][to].y};
+        };
+        std::set<Edge> edges;
+        for (const uint32_t i : part)
+            for (size_t e = 0; e < 3; ++e) edges.insert(edge(i, e, (e + 1) % 3));
+        std::array<float, edge_directions> length{}, longest{};
+        std::array<glm::vec2, edge_directions> direction;
+        for (const uint32_t i : part)
+            for (size_t e = 0; e < 3; ++e) {
+                if (edges.contains(edge(i, (e + 1) % 3, e))) continue;
+                glm::vec2 d = flat_[i][(e + 1) % 3] - flat_[i][e];
+                const float edge_m = glm::length(d);
+                if (edge_m < touching_m) continue;
+                d /= edge_m;
+                while (!(d.x > 0 && d.y >= 0)) d = {-d.y, d.x};
+                const float turn = std::atan2(d.y, d.x) / (0.5f * std::numbers::pi_v<float>);
+                const auto at = static_cast<size_t>(std::lround(turn * edge_directions)) % edge_directions;
+                length[at] += edge_m;
+                if (edge_m <= longest[at]) continue;
+                longest[at] = edge_m;
+                direction[at] = d;
+            }
+        const auto most = static_cast<size_t>(std::ranges::max_element(length) - length.begin());
+        return length[most] < 2 * length[0] || most == 0 ? std::nullopt : std::optional(direction[most]);
+    }
+
     // Edges that lie on one line and overlap with opposite directions: shared edges, T-junctions included.
     void findContacts() {
         struct Edge {
@@ -313,9 +373,27 @@ std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_
     std::map<PlaneKey, std::vector<uint32_t>> planes;
     for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
     std::vector<PlanarChart> charts;
+    const auto chart = [&](PlaneGrouper& plane) {
+        std::ranges::move(plane.charts(blocked), std::back_inserter(charts));
+    };
     for (auto& [key, ids] : planes) {
-        auto of_plane = PlaneGrouper(faces, std::move(ids), side_max_texels).charts(blocked);
-        std::ranges::move(of_plane, std::back_inserter(charts));
+        const Axes axes(faces[ids[0]].normal);
+        PlaneGrouper plane(faces, ids, axes, side_max_texels);
+        auto turned = plane.turned();
+        if (turned.empty()) {
+            chart(plane);
+            continue;
+        }
+        std::set<uint32_t> others;
+        for (auto& [own_axes, part] : turned) {
+            others.insert(part.begin(), part.end());
+            PlaneGrouper own(faces, std::move(part), own_axes, side_max_texels);
+            chart(own);
+        }
+        std::erase_if(ids, [&](uint32_t id) { return others.contains(id); });
+        if (ids.empty()) continue;
+        PlaneGrouper rest(faces, std::move(ids), axes, side_max_texels);
+        chart(rest);
     }
     // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
     std::ranges::sort(charts, {}, [](const PlanarChart& c) { return c.faces[0]; });

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <span>
 
 namespace dimmer::cook::test {
 namespace {
@@ -34,6 +35,27 @@ TEST(PlanarCharts, OfManyPartsCompareNeighboursAlone) {
         for (const PlanarChart& chart : planarCharts(faces, 1u << 20, blocked)) found += chart.faces.size();
         EXPECT_EQ(found, faces.size());
         EXPECT_LT(asked, size_t{100} * count);
+    }
+}
+
+// What is turned against the rest of its plane has a chart along its own edges, as small as it is itself. A square's
+// diagonals are longer than its sides, but no edges of it.
+TEST(PlanarCharts, LieAlongTheEdgesOfWhatIsTurned) {
+    auto faces = tiles(4, 1, 1, 0);
+    for (const float degrees : {20.0f, 45.0f}) {
+        const float c = std::cos(glm::radians(degrees)), s = std::sin(glm::radians(degrees));
+        for (PlanarFace face : tiles(3, 3, 1, 0)) {
+            for (glm::vec3& p : face.corners_m) p = {10 + degrees + c * p.x + s * p.z, 0, c * p.z - s * p.x};
+            faces.push_back(face);
+        }
+    }
+    const auto charts = planarCharts(faces, 1u << 20, {});
+    ASSERT_EQ(charts.size(), 3u);
+    EXPECT_NEAR(charts[0].size_m.x * charts[0].size_m.y, 4, 1e-3);
+    for (const PlanarChart& chart : std::span(charts).subspan(1)) {
+        EXPECT_NEAR(chart.size_m.x, 3, 1e-3);
+        EXPECT_NEAR(chart.size_m.y, 3, 1e-3);
+        EXPECT_NEAR(glm::dot(chart.u_axis, chart.v_axis), 0, 1e-6);
     }
 }
 

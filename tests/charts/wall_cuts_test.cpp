@@ -27,7 +27,8 @@ Scene twoRooms() {
 }
 
 // A texel of both rooms would carry light of the one into the other, and so would a page that filters between two.
-void expectRoomsApart(const RayScene& rays, const Unwrap& charts) {
+// `turned`: the scene, from where twoRooms() has it.
+void expectRoomsApart(const RayScene& rays, const Unwrap& charts, const glm::mat3& turned = glm::mat3(1)) {
     const Texels texels = sampleTexels(rays, charts, 4);
     struct Sides {
         bool left = false, right = false;
@@ -36,7 +37,7 @@ void expectRoomsApart(const RayScene& rays, const Unwrap& charts) {
     size_t points = 0;
     for (size_t i = 0; i < texels.size(); ++i)
         for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
-            const glm::vec3 p = texels.sample(i, s).position_m;
+            const glm::vec3 p = glm::transpose(turned) * texels.sample(i, s).position_m;
             const uint32_t face = texels.sample(i, s).face;
             const bool in_rooms = p.y > -0.05f && p.y < 2.75f && std::abs(p.x) > half_wall_m;
             if (!in_rooms || std::abs(charts.frames[face].normal.y) < 0.9f) continue;
@@ -58,6 +59,25 @@ TEST(WallCuts, RoomsWithADoorwayShareNoChartAtAnyDensity) {
         const auto charts = unwrap(rays, {.texels_per_metre = density, .page_size = 256});
         ASSERT_TRUE(charts.has_value());
         expectRoomsApart(rays, *charts);
+    }
+}
+
+// A building that does not stand along the world's axes has its charts along its own: of floors too, which have no
+// direction by themselves.
+TEST(WallCuts, RoomsThatAreTurnedShareNoChart) {
+    for (const float degrees : {15.0f, 30.0f, 45.0f, 75.0f}) {
+        SCOPED_TRACE(degrees);
+        const glm::mat3 turned(glm::rotate(glm::mat4(1), glm::radians(degrees), {0, 1, 0}));
+        Scene scene = twoRooms();
+        for (SceneMesh& mesh : scene.meshes) {
+            for (glm::vec3& p : mesh.positions_m) p = turned * p;
+            for (glm::vec3& n : mesh.normals) n = turned * n;
+        }
+        cutAtWalls(scene, 4);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        expectRoomsApart(rays, *charts, turned);
     }
 }
 
