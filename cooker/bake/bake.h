@@ -85,9 +85,9 @@ struct BakedGrid {
 // Two doors whose light depends on how both stand, while no combination covers them.
 struct DoorPair {
     uint32_t first = 0, second = 0;  // into Scene::doors
-    // What is off without the combination while both are open, at most: luminous flux over paths that need one open and
-    // ask how the other stands, over all that opening the lesser of the two alone changes; infinite where that is
-    // nothing.
+    // What is off without the combination while both are open, measured with few rays: luminous flux over paths that
+    // need one open and ask how the other stands, over all that opening the lesser of the two alone changes; infinite
+    // where that is nothing.
     float loss = 0;
 };
 

@@ -3,6 +3,8 @@
 #include <bake/sampling.h>
 #include <bake/series.h>
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -14,6 +16,8 @@ namespace {
 // The flux over a whole level is measured: so many rays in all, within limits per texel.
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
+// Of the threshold, where a door by itself moves no light at all.
+constexpr double black_share = 0.1;
 // Of two fluxes only the ratio counts: what the last bounces bring goes to both.
 constexpr float measured_tail_max = 0.05f;
 
@@ -46,17 +50,6 @@ bool coveredForAll(const Scene& scene, const DoorIndices& pair, uint32_t groups)
     for (uint32_t g = 0; g < groups; ++g)
         if (!covered(scene, pair, g)) return false;
     return true;
-}
-
-std::set<DoorIndices> seenTogether(const Scene& scene, const Sparse<uint32_t>& doors_seen, uint32_t groups) {
-    std::set<DoorIndices> pairs;
-    for (size_t i = 0; i < doors_seen.rows(); ++i) {
-        const auto row = doors_seen.row(i);  // ascending
-        for (size_t a = 0; a < row.size(); ++a)
-            for (size_t b = a + 1; b < row.size(); ++b) pairs.insert({row[a], row[b]});
-    }
-    std::erase_if(pairs, [&](const DoorIndices& pair) { return coveredForAll(scene, pair, groups); });
-    return pairs;
 }
 
 // The doors that a term is about, ascending.
@@ -130,19 +123,47 @@ std::vector<DoorIndices> doorsInSight(const RayScene& rays) {
         }
         return false;
     };
-    std::vector<DoorIndices> pairs;
-    for (uint32_t a = 0; a < doors; ++a)
+    std::vector<std::vector<DoorIndices>> of_first(doors);
+    tbb::parallel_for(uint32_t{0}, doors, [&](uint32_t a) {
         for (uint32_t b = a + 1; b < doors; ++b)
-            if (inSight(a, b)) pairs.emplace_back(a, b);
+            if (inSight(a, b)) of_first[a].emplace_back(a, b);
+    });
+    std::vector<DoorIndices> pairs;
+    for (const auto& some : of_first) pairs.insert(pairs.end(), some.begin(), some.end());
     return pairs;
+}
+
+std::vector<DoorIndices> doorsNear(const Links& links, const Sparse<uint32_t>& doors_seen) {
+    if (doors_seen.entryCount() == 0) return {};
+    std::vector<std::set<DoorIndices>> of_block(blockCount(doors_seen.rows()));
+    forEachBlock(doors_seen.rows(), [&](size_t begin, size_t end) {
+        std::set<DoorIndices>& pairs = of_block[begin / rows_per_block];
+        std::vector<Link> seen;
+        std::set<uint32_t> doors;
+        for (size_t i = begin; i < end; ++i) {
+            const auto own = doors_seen.row(i);
+            doors = {own.begin(), own.end()};
+            links.get(i, seen);
+            for (const Link& link : seen) {
+                if (link.path != free_path || !doors_seen.any(link.receiver)) continue;
+                const auto theirs = doors_seen.row(link.receiver);
+                doors.insert(theirs.begin(), theirs.end());
+            }
+            for (auto a = doors.begin(); a != doors.end(); ++a)
+                for (auto b = std::next(a); b != doors.end(); ++b) pairs.emplace(*a, *b);
+        }
+    });
+    std::set<DoorIndices> all;
+    for (const auto& pairs : of_block) all.insert(pairs.begin(), pairs.end());
+    return {all.begin(), all.end()};
 }
 
 std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
                                std::span<const uint8_t> groups, Progress& progress, RayEnds* links,
                                uint32_t terms_at_once) {
     const Scene& scene = gatherer.rays().scene();
-    const auto seen = seenTogether(scene, series.doors_seen, gatherer.paths().groupCount());
-    const std::vector<DoorIndices> pairs(seen.begin(), seen.end());
+    std::vector<DoorIndices> pairs = series.doors_near;
+    std::erase_if(pairs, [&](const DoorIndices& p) { return coveredForAll(scene, p, gatherer.paths().groupCount()); });
     std::vector<DoorFlux> flux(groups.size());
     if (pairs.empty()) return flux;
     const auto in_sight = doorsInSight(gatherer.rays());
@@ -192,8 +213,9 @@ std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeS
         const auto alone = [&](uint32_t door) { return sum([&](const DoorFlux& f) { return f.alone[door]; }); };
         const auto [less, more] = std::minmax({alone(first), alone(second)});
         const double off = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
-        // Behind one door in a row with another there may be no light at all but through both.
-        const bool all = !(less > 0) && off > static_cast<double>(settings.threshold) * more;
+        // Behind one door in a row with another there may be no light at all but through both: a room that is black
+        // instead of dim shows, however little of the first one's light gets there.
+        const bool all = !(less > 0) && off > black_share * static_cast<double>(settings.threshold) * more;
         const auto loss = all ? INFINITY : static_cast<float>(less > 0 ? off / less : 0);
         if (loss > settings.threshold) found.push_back({first, second, loss});
     }

@@ -455,6 +455,7 @@ glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float 
 
 template <class Light>
 void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const {
+    if (!options.wanted_in_group.empty() && options.wanted_in_group[always_group] == 0) return;
     const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
         const uint32_t index = firstSample(options) + i;

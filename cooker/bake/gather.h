@@ -104,8 +104,8 @@ struct GatherOptions {
     // More rays by the intake, of which only those that may meet a door's leaf are traced, and only light over paths
     // that need a door is taken. Not together with aims or rounds.
     uint32_t door_rays = 0;
-    // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked. Empty:
-    // all are.
+    // Per light group, how many of its terms the accumulator wants; emitters of groups with none are not asked, nor is
+    // an image sky where that is always-on light. Empty: all are.
     std::span<const uint32_t> wanted_in_group;
     // Where the receiver's rays end, counted like first_ray: known ones are not traced, unknown ones become known.
     // Null: none is remembered. With emitters where others are they are not the same.

@@ -131,7 +131,7 @@ float ReferenceTracer::weigh(const Sources& s, glm::vec3 p, std::vector<float>& 
 }
 
 ReferenceTracer::ReferenceTracer(const RayScene& rays, const ReferenceOptions& options)
-    : rays_(rays), options_(options) {
+    : rays_(rays), options_(options), sky_(rays.scene()) {
     const Scene& scene = rays.scene();
     for (uint32_t i = 0; i < scene.lights.size(); ++i) {
         const PunctualLight& light = scene.lights[i];
@@ -279,6 +279,20 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
             (by_area + by_hit));
 }
 
+// By the sky's own directions: a sun in the picture is small, and paths hardly ever leave the level towards it.
+glm::vec3 ReferenceTracer::skyLight(const Vertex& vertex, Path& path) const {
+    if (sky_.empty() || options_.always_weight == 0) return glm::vec3(0);
+    const float choice = path.next();
+    const glm::vec3 direction = sky_.sample(choice, path.next2());
+    const float cos_surface = vertex.cosine(direction);
+    if (!(cos_surface > 0)) return glm::vec3(0);
+    const glm::vec3 radiance = skyRadiance(rays_.scene(), direction);
+    const float by_sky = sky_.pdf(radiance);
+    if (!(by_sky > 0)) return glm::vec3(0);
+    return radiance * (options_.always_weight * cos_surface * rays_.transmittance(vertex.point, direction, far_away_m) /
+                       (by_sky + cos_surface / pi));
+}
+
 // The surface that was hit as the next vertex; empty where it reflects nothing.
 std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit) const {
     const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
@@ -302,6 +316,7 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         sum += throughput / pi * lampBounce(vertex, path);
         vertex.area_weight_sum = weigh(area_sources_, vertex.point, path.weights);
         sum += throughput / pi * areaLight(vertex, path);
+        sum += throughput / pi * skyLight(vertex, path);
         if (i > roulette_after) {
             const float survive = std::clamp(std::max({throughput.x, throughput.y, throughput.z}) / pi, 0.05f, 0.95f);
             if (path.next() >= survive) return sum;
@@ -313,10 +328,14 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         const glm::vec3 direction = t * d.x + b * d.y + vertex.normal * d.z;
         if (!(vertex.cosine(direction) > 0)) return sum;
         const auto hit = rays_.nearest(vertex.point, direction, far_away_m, path.nextBits());
-        if (!hit) return sum + throughput * skyRadiance(scene, direction) * options_.always_weight;
+        const float by_hit = d.z / pi;
+        if (!hit) {
+            const glm::vec3 radiance = skyRadiance(scene, direction);
+            return sum + throughput * radiance * (options_.always_weight * by_hit / (by_hit + sky_.pdf(radiance)));
+        }
         const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
         if (hit->back && !scene.materials[triangle.material].double_sided) return sum;
-        const float by_hit = d.z / pi, cos_there = std::abs(glm::dot(direction, triangle.normal));
+        const float cos_there = std::abs(glm::dot(direction, triangle.normal));
         if (const uint32_t light = area_light_of_[hit->triangle]; light != none)
             sum += throughput * area_lights_[light].radiance_cd_m2 *
                    (by_hit / (by_hit + areaPdf(vertex, light, hit->distance_m, cos_there)));

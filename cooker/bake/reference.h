@@ -2,6 +2,7 @@
 // nothing else: no texels, no stored bounces, no links; what it says is the truth up to its own stated noise.
 #pragma once
 
+#include <bake/reference_sky.h>
 #include <trace/ray_scene.h>
 
 #include <cstdint>
@@ -53,11 +54,11 @@ class ReferenceEstimate {
 };
 
 // Thread-safe. The component that a pack stores: indirect light, and direct light of emitters, the sky and lights baked
-// with BakeMode::Full. Doors stand as `rays` has them. Paths with next-event estimation at every vertex: emitters
-// combined with hits by the balance heuristic (Veach 1995), lamps picked by what they would do unshadowed. What a lamp
-// lights close by is small and bright, and paths rarely find it: so the lamp shines at random too, and where that falls
-// is connected to the vertex, combined with the paths' own hits likewise. Russian roulette after three bounces.
-// Unbiased.
+// with BakeMode::Full. Doors stand as `rays` has them. Paths with next-event estimation at every vertex: emitters and
+// an image sky combined with hits and misses by the balance heuristic (Veach 1995), lamps picked by what they would do
+// unshadowed. What a lamp lights close by is small and bright, and paths rarely find it: so the lamp shines at random
+// too, and where that falls is connected to the vertex, combined with the paths' own hits likewise. Russian roulette
+// after three bounces. Unbiased.
 class ReferenceTracer {
    public:
     ReferenceTracer(const RayScene& rays, const ReferenceOptions& options);
@@ -99,6 +100,7 @@ class ReferenceTracer {
     float lampPdf(const Vertex& from, uint32_t lamp, const Vertex& lit) const;
     std::optional<Vertex> vertexAt(const Hit& hit) const;
     glm::vec3 areaLight(const Vertex& vertex, Path& path) const;
+    glm::vec3 skyLight(const Vertex& vertex, Path& path) const;
     float areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const;
     glm::vec3 trace(Vertex vertex, Path& path) const;
     Start startAt(const ReferencePoint& point) const;
@@ -106,6 +108,7 @@ class ReferenceTracer {
 
     const RayScene& rays_;
     ReferenceOptions options_;
+    ReferenceSky sky_;
     std::vector<Light> suns_, lamps_;  // directional, and those with a place; only what shines
     Sources lamp_sources_, area_sources_;
     std::vector<AreaLight> area_lights_;

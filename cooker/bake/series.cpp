@@ -2,6 +2,7 @@
 
 #include <bake/activity.h>
 #include <bake/direct.h>
+#include <bake/door_pairs.h>
 #include <bake/links.h>
 #include <bake/sampling.h>
 #include <bake/sums.h>
@@ -56,6 +57,7 @@ class Expansion {
 
     Series run() {
         directPass(UINT32_MAX);
+        out_.doors_near = doorsNear(links_, doors_seen_);
         bounce();
         out_.radiance = outgoing(out_.bounced, true);
         activity_.decide(out_);

@@ -20,6 +20,7 @@ struct Series {
     Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
     SparseLight radiance;                 // what leaves each receiver, cd/m2
     Sparse<uint32_t> doors_seen;          // by the rays of each receiver, ascending
+    std::vector<DoorIndices> doors_near;  // pairs of one another; see doorsNear() (bake/door_pairs.h)
     std::vector<TermReport> reports;      // per term
     std::vector<float> threshold_base;    // lux per term: what its threshold is a share of
     std::vector<uint32_t> bounces;        // per light group

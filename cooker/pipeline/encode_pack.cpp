@@ -75,7 +75,7 @@ void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& sta
         const std::string what =
             std::isinf(pair.loss)
                 ? "light that only comes through both is missing while both are open"
-                : fmt::format("up to {:.0f} % of the light that the lesser of them moves is off while both are open",
+                : fmt::format("some {:.0f} % of the light that the lesser of them moves is off while both are open",
                               100 * static_cast<double>(pair.loss));
         stats.warnings.push_back(
             fmt::format("{}: '{}' and '{}' depend on each other: {}; name [\"{}\", \"{}\"] in the scene's "

@@ -86,7 +86,7 @@ class LocalBake {
           settings_(settings),
           groups_(groups),
           progress_(progress),
-          lights_(gatherer.rays(), settings.light_grid) {
+          lights_(gatherer.rays(), settings.light_grid, groups) {
         const auto& models = gatherer.rays().scene().models;
         for (uint32_t m = 0; m < models.size(); ++m) {
             if (models[m].moves) continue;
@@ -107,14 +107,13 @@ class LocalBake {
             if (at.source[i] != i) return 0;
             const SamplePoint point{at.position_m[i], no_face};
             return gather.gather(
-                Gatherer::atProbe(point, local_probe_seed + number, gatherer_.models().modelOfProbe(number)), groups_,
-                row);
+                Gatherer::atProbe(point, local_probe_seed + number, gatherer_.models().modelOfProbe(number)), row);
         });
         for (size_t i = 0; i < probes_; ++i)
             if (at.source[i] != i && at.source[i] != no_index) at_probes[i] = at_probes[at.source[i]];
         const auto at_places = gathered<Gathered>(places_.size(), [&](size_t i, auto& gather, auto& row) {
             return gather.gather({.points = {&places_[i].point, 1}, .id = local_place_seed + static_cast<uint32_t>(i)},
-                                 groups_, row);
+                                 row);
         });
         progress_.advance(size_t{places_per_probe} * probes_ - places_.size());
         tbb::parallel_for(size_t{0}, model_.size(), [&](size_t m) {
@@ -149,7 +148,7 @@ class LocalBake {
     std::vector<std::vector<LightOfTerm<Light>>> gathered(size_t count, auto&& at) {
         std::vector<std::vector<LightOfTerm<Light>>> rows(count);
         tbb::parallel_for(tbb::blocked_range<size_t>(0, count, 8), [&](const auto& range) {
-            ReceiverGather<Light> gather(gatherer_, lights_, series_, settings_);
+            ReceiverGather<Light> gather(gatherer_, lights_, series_, settings_, groups_);
             uint64_t traced = 0;
             for (size_t i = range.begin(); i < range.end(); ++i) traced += at(i, gather, rows[i]);
             rays_ += traced;

@@ -15,11 +15,13 @@ constexpr uint32_t rays_per_texel_ray = 4;
 
 template <class Light>
 ReceiverGather<Light>::ReceiverGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
-                                      const BakeSettings& settings)
+                                      const BakeSettings& settings, std::span<const uint8_t> groups)
     : gatherer_(gatherer),
       lights_(lights),
       series_(series),
       settings_(settings),
+      groups_(groups),
+      wanted_in_group_(groups.size()),
       floors_(noiseFloors(series, gatherer.paths().groupCount())),
       options_(finalGatherOptions(settings, floors_)),
       final_(gatherer_),
@@ -27,12 +29,16 @@ ReceiverGather<Light>::ReceiverGather(const Gatherer& gatherer, const LightGrid&
       direct_(gatherer_.paths().termCount()),
       stored_(gatherer_.paths().termCount()) {
     if (std::is_same_v<Light, ProbeLight>) options_.rays_max *= rays_per_texel_ray;
+    for (uint32_t t = 0; t < gatherer_.paths().termCount(); ++t) {
+        const uint32_t group = gatherer_.paths().terms()[t].group;
+        sum_.setWanted(t, groups_[group] != 0);
+        wanted_in_group_[group] += groups_[group] != 0;
+    }
 }
 
 template <class Light>
-uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::span<const uint8_t> groups,
-                                       std::vector<LightOfTerm<Light>>& row) {
-    const uint64_t shadow_rays = findActive(from, groups);
+uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::vector<LightOfTerm<Light>>& row) {
+    const uint64_t shadow_rays = findActive(from);
     row.clear();
     const uint64_t traced = final_.gather(from, active_, series_.radiance, options_, row, nullptr, bounced_);
     for (LightOfTerm<Light>& l : row)
@@ -44,13 +50,13 @@ uint64_t ReceiverGather<Light>::gather(const GatherFrom& from, std::span<const u
 
 // Lit straight, or by as much as the term's threshold asks: by own rays, where texels look at their neighbours' too.
 template <class Light>
-uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from, std::span<const uint8_t> groups) {
+uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from) {
     const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, stored_);
     gatherer_.gather(from,
                      {.rays = settings_.series_rays,
                       .emitter_samples = settings_.emitter_samples,
                       .seed = settings_.seed,
-                      .wanted_in_group = {}},
+                      .wanted_in_group = wanted_in_group_},
                      &series_.radiance, sum_, nullptr);
     bounced_.clear();
     for (const uint32_t t : sum_.touched())
@@ -66,7 +72,7 @@ uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from, std::span<con
     }
     std::ranges::sort(active_);
     active_.erase(std::unique(active_.begin(), active_.end()), active_.end());
-    std::erase_if(active_, [&](uint32_t t) { return !groups[gatherer_.paths().terms()[t].group]; });
+    std::erase_if(active_, [&](uint32_t t) { return !groups_[gatherer_.paths().terms()[t].group]; });
     return shadow_rays;
 }
 

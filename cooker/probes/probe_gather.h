@@ -16,21 +16,23 @@ namespace dimmer::cook {
 template <class Light>
 class ReceiverGather {
    public:
+    // `groups`: per light group, whether it is asked for; `lights` has the lamps of those.
     ReceiverGather(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
-                   const BakeSettings& settings);
+                   const BakeSettings& settings, std::span<const uint8_t> groups);
 
-    // Replaces `row`. `id` seeds the probe's rays; `groups`: per light group, whether it is asked for; `ignored`: the
-    // model that the probe lights. Returns the rays traced.
-    uint64_t gather(const GatherFrom& from, std::span<const uint8_t> groups, std::vector<LightOfTerm<Light>>& row);
+    // Replaces `row`. Returns the rays traced.
+    uint64_t gather(const GatherFrom& from, std::vector<LightOfTerm<Light>>& row);
 
    private:
     // Returns the shadow rays traced.
-    uint64_t findActive(const GatherFrom& from, std::span<const uint8_t> groups);
+    uint64_t findActive(const GatherFrom& from);
 
     const Gatherer& gatherer_;
     const LightGrid& lights_;
     const Series& series_;
     const BakeSettings& settings_;
+    std::span<const uint8_t> groups_;
+    std::vector<uint32_t> wanted_in_group_;
     std::vector<float> floors_;
     FinalGatherOptions options_;
     FinalGather<Light> final_;

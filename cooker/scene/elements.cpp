@@ -134,6 +134,12 @@ Expected<void> Elements::combination(const tinygltf::Value& list) {
                                           "each is open, closed or either; {} are the most. Name fewer, or several "
                                           "combinations of those that see one another.",
                                           doors, combined_doors_max));
+    if (doors < 2)
+        context_.warn(
+            "'dimmer_combinations'",
+            fmt::format("a combination names {}: light that asks for fewer than two doors is kept without one, "
+                        "so that it does nothing. Name another door in it, or remove it.",
+                        doors == 0 ? "no door" : "one door"));
     context_.scene.combinations.push_back(std::move(combination));
     return {};
 }

@@ -3,6 +3,7 @@
 #include <scene/open_pose.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer::cook {
 namespace {
@@ -11,10 +12,25 @@ bool opensByPose(const Scene& scene, const SceneMesh& mesh) {
     return mesh.door && scene.doors[*mesh.door].pose && mesh.lighting != Lighting::Dynamic;
 }
 
+// Of axes that are unit and at right angles but for rounding.
+constexpr double bend_max = 1e-3;
+
+bool isRigid(const glm::dmat4& movement) {
+    const glm::dmat3 axes(movement), square = glm::transpose(axes) * axes;
+    for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+            if (!(std::abs(square[i][j] - (i == j ? 1 : 0)) <= bend_max)) return false;
+    return true;
+}
+
 }  // namespace
 
 Expected<void> checkOpenPoses(const ImportContext& context) {
     for (const SceneMesh& mesh : context.scene.meshes) {
+        if (opensByPose(context.scene, mesh) && !isRigid(mesh.open_from_closed))
+            return context.error(context.nodeLabel(mesh.gltf_node),
+                                 "its open pose would bend the leaf: a node above it is scaled unevenly and the leaf "
+                                 "turned against that. Scale that node evenly, or apply its scale to the meshes.");
         const auto isNear = [&](const glm::vec3& p) {
             return glm::length(glm::dvec3(mesh.open_from_closed * glm::dvec4(p, 1))) <= coordinate_max_m;
         };

@@ -5,7 +5,8 @@
 
 namespace dimmer::cook {
 
-// Errors name the node of a leaf that stands more than coordinate_max_m from the origin while its door is open.
+// Errors name the node of a leaf that stands more than coordinate_max_m from the origin while its door is open, or is
+// bent by its pose.
 Expected<void> checkOpenPoses(const ImportContext& context);
 
 // A leaf as it stands while its door is open. `closed` must belong to a door that opens by a pose.

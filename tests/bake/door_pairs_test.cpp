@@ -122,5 +122,37 @@ TEST(DoorPairs, AreFoundWhereOneDoorAloneChangesNothing) {
     EXPECT_TRUE(found(scene).empty());
 }
 
+// Two doors at the ends of a corridor that turns twice: no surface sees both, and what comes through both is all the
+// light of the last room.
+TEST(DoorPairs, AreFoundAroundTwoBends) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.85f));
+    addBox(scene, {4.5f, 1.25f, 2}, white);
+    const auto wall = [&](float x0, float x1, float z0, float z1) {
+        addSolid(scene, "wall", {(x0 + x1) / 2, 0, (z0 + z1) / 2}, {(x1 - x0) / 2, 1.25f, (z1 - z0) / 2}, white);
+    };
+    scene.doors = {{"a", false}, {"b", false}};
+    for (uint32_t d = 0; d < 2; ++d) {
+        const float x = d == 0 ? -1.5f : 1.5f;
+        wall(x - 0.05f, x + 0.05f, -2, -1.8f);
+        wall(x - 0.05f, x + 0.05f, -0.8f, 2);
+        addSolid(scene, "leaf", {x, 0, -1.3f}, {0.03f, 1.25f, 0.5f}, white, d);
+    }
+    wall(-0.05f, 0.05f, -2, 0.6f);       // the corridor goes around this
+    wall(-1.45f, -0.65f, -0.3f, -0.2f);  // and past these, behind which the doors are
+    wall(0.65f, 1.45f, -0.3f, -0.2f);
+    scene.light_sets = {{"lamp", 1}};
+    addPointLight(scene, {-3.3f, 0.75f, -0.8f}, 500, BakeMode::Full).light_set = 0;
+    BakedScene b(scene);
+    const EmitterSampler emitters(*b.rays, meshGroups(scene));
+    const DoorPaths paths(scene, doorsInSight(*b.rays));
+    const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
+    SilentProgress quiet;
+    const Series series = expandSeries(gatherer, {.series_rays = 32, .final_rays = 1}, quiet);
+    for (size_t i = 0; i < series.doors_seen.rows(); ++i) ASSERT_LT(series.doors_seen.row(i).size(), 2u);
+    b.bake({.series_rays = 32, .final_rays = 1});
+    ASSERT_EQ(b.baked.dependent_doors.size(), 1u);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

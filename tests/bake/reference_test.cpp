@@ -134,6 +134,32 @@ TEST(Reference, OpenPlaneUnderAConstantSky) {
     expectLux(trace(scene, {0, 0.01f, 0}, {1, 0, 0}, 20000), 100 * pi_d * 0.75, 0.01);
 }
 
+// A sun of four texels in a dim picture, a seventy-thousandth of the sphere: against the sum over texels, which is
+// exact, and behind a wall that hides it against the dim rest of the half that is in sight. So few paths hardly meet
+// the sun by chance: what they found would be either far too little, with next to no noise, or far too much.
+TEST(Reference, ATinySunInThePictureOfTheSky) {
+    constexpr uint32_t width = 1024, height = 512, row = 128, column = 640;
+    Image image{width, height, std::vector<glm::vec4>(width * height, glm::vec4(1))};
+    double expected = pi_d;
+    for (uint32_t y = row; y < row + 2; ++y)
+        for (uint32_t x = column; x < column + 2; ++x) {
+            image.texels[y * width + x] = glm::vec4(1e6f + 1);
+            const auto square = [](double s) { return s * s; };
+            // Of cosine over a texel: d(azimuth) (sin^2 lower - sin^2 upper) / 2, in polar angles.
+            expected += 1e6 * 2 * pi_d / width * 0.5 *
+                        (square(std::sin(pi_d * (y + 1) / height)) - square(std::sin(pi_d * y / height)));
+        }
+    Scene scene;
+    addFloor(scene, 50, addMaterial(scene, lambert(0)));
+    scene.sky_image = std::make_shared<const Image>(std::move(image));
+    scene.sky_radiance_cd_m2 = glm::vec3(1);
+    EXPECT_GT(expected, 20 * pi_d) << "the sun would not matter";
+    expectLux(trace(scene, {0, 0, 0}, up, 256), expected, 0.03);
+    // Azimuth (column / width - 1/2) of a turn: 45 degrees from +x towards +z.
+    addSolid(scene, "wall", {10, 10, 10}, {9, 10, 9}, addMaterial(scene, lambert(0)));
+    EXPECT_LT(trace(scene, {0, 0, 0}, up, 256).irradiance_lux.x, pi_d);
+}
+
 TEST(Reference, ABlendedSheetPassesItsShare) {
     Scene scene;
     addFloor(scene, 3, addMaterial(scene, lambert(0)));

@@ -4,6 +4,9 @@
 #include <pipeline/cooked_level.h>
 #include <pipeline/truth_file.h>
 
+#include <algorithm>
+#include <map>
+
 namespace dimmer::cook::test {
 namespace {
 
@@ -31,27 +34,41 @@ TEST(GridTruth, TwoRooms) {
     if (!std::filesystem::exists(truth_folder)) GTEST_SKIP() << "the reference irradiance is not here";
     const auto scene = importLevel(levels_folder / "two_rooms.glb");
     ASSERT_TRUE(scene) << scene.error().message;
-    SilentProgress progress;
-    CookStats stats;
-    auto profile = *loadProfile("desktop");
-    profile.global_grid = GridMode::On;  // nothing moves there
-    auto data = cookScene(*scene, profile, "draft", progress, stats);
-    ASSERT_TRUE(data) << data.error().message;
-    const auto pack = Pack::fromData(std::move(*data));
-    ASSERT_TRUE(pack) << pack.error().message;
-    EXPECT_LE(static_cast<double>(pack->data().probes.base.size()), stats.free_volume_m3);
     const double floor_lux = truthFloor(readTruth("two_rooms.free.all_on"));
-    for (const auto& [name, state] :
-         {std::pair("all_on", ""), {"all_off", "all=0"}, {"only_first", "all=0,desk=1"}, {"door_0", "door:mid=1"}}) {
-        const auto truth = readTruth(std::string("two_rooms.free.") + name);
-        const ErrorFigures f = gridErrorAgainst(*pack, state, truth, floor_lux);
-        printf("two_rooms %s in the open, at draft: mean %.2f %%, p95 %.2f %%, bias %+.2f %%\n", name, 100 * f.mean,
-               100 * f.p95, 100 * f.bias);
-        EXPECT_EQ(f.points, truth.size());
-        // The goals for our own levels are 8 and 25 %, at final. Where 58 probes end up is chaotic: found were 7.0
-        // to 8.8 and 19 to 30 % after changes that moved no surface's light by 0.2 points.
-        EXPECT_LE(f.mean, 0.10) << name;
-        EXPECT_LE(f.p95, 0.33) << name;
+    constexpr std::pair<const char*, const char*> states[] = {
+        {"all_on", ""}, {"all_off", "all=0"}, {"only_first", "all=0,desk=1"}, {"door_0", "door:mid=1"}};
+    // Where 58 probes end up is chaotic, and what a single point behind a wall finds is the mean of a state with one
+    // lamp: the middle one of five placements is asked for.
+    std::map<std::string, std::vector<double>> means, p95s;
+    for (const float spacing_m : {0.26f, 0.28f, 0.3f, 0.32f, 0.34f}) {
+        SilentProgress progress;
+        CookStats stats;
+        auto profile = *loadProfile("desktop");
+        profile.global_grid = GridMode::On;  // nothing moves there
+        profile.global_min_spacing_m = spacing_m;
+        auto data = cookScene(*scene, profile, "draft", progress, stats);
+        ASSERT_TRUE(data) << data.error().message;
+        const auto pack = Pack::fromData(std::move(*data));
+        ASSERT_TRUE(pack) << pack.error().message;
+        EXPECT_LE(static_cast<double>(pack->data().probes.base.size()), stats.free_volume_m3);
+        for (const auto& [name, state] : states) {
+            const auto truth = readTruth(std::string("two_rooms.free.") + name);
+            const ErrorFigures f = gridErrorAgainst(*pack, state, truth, floor_lux);
+            printf("two_rooms %s in the open, at draft: mean %.2f %%, p95 %.2f %%, bias %+.2f %%\n", name, 100 * f.mean,
+                   100 * f.p95, 100 * f.bias);
+            EXPECT_EQ(f.points, truth.size());
+            means[name].push_back(f.mean);
+            p95s[name].push_back(f.p95);
+        }
+    }
+    const auto middle = [](std::vector<double> of) {
+        std::ranges::nth_element(of, of.begin() + 2);
+        return of[2];
+    };
+    // The goals for our own levels are 8 and 25 %, at final.
+    for (const auto& [name, state] : states) {
+        EXPECT_LE(middle(means[name]), 0.10) << name;
+        EXPECT_LE(middle(p95s[name]), 0.33) << name;
     }
 }
 

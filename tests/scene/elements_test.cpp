@@ -375,6 +375,46 @@ TEST(SceneElements, SetsAndDoorsHaveSeparateNames) {
     EXPECT_FALSE(scene->combinations[0][1].is_door);
 }
 
+// Light that asks for no door or for one is kept in any case: whoever forgot a name is told.
+TEST(SceneElements, CombinationsThatDoNothingAreSaidTo) {
+    LevelFile level = levelWithLamp({{"dimmer_light_set", "hall"}});
+    for (const char* name : {"front", "back"})
+        level.addNode({{"name", name}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", name}}}});
+    json& combinations = level.document["scenes"][0]["extras"]["dimmer_combinations"];
+    for (const json& list : {json{"hall", "hall"}, json{"door:front", "door:front"}, json{"door:front", "hall"}}) {
+        combinations = json::array();
+        combinations.push_back(list);
+        SCOPED_TRACE(combinations.dump());
+        const auto scene = level.import();
+        ASSERT_IMPORTED(scene);
+        EXPECT_EQ(scene->warnings.size(), 1u);
+        expectWarning(*scene, {"dimmer_combinations", "does nothing"});
+    }
+    combinations = json::array({json{"door:front", "door:back"}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_TRUE(scene->warnings.empty());
+}
+
+// A leaf that is turned below an uneven scale has axes that are not at right angles: its pose is no turn.
+TEST(SceneElements, APoseBelowAnUnevenScaleIsRefused) {
+    LevelFile level = LevelFile::withFloor();
+    const int frame = level.addNode({{"name", "frame"}, {"scale", {1, 1, 2}}});
+    const double s = std::sin(0.25), c = std::cos(0.25);
+    const int leaf = level.addNode(
+        {{"name", "leaf"},
+         {"mesh", level.addSquareMesh(0)},
+         {"rotation", {0, s, 0, c}},
+         {"extras", {{"dimmer_door", "front"}, {"dimmer_door_open", "pose"}, {"dimmer_door_rotation", {0, 1, 0, 1}}}}},
+        frame);
+    expectBadInput(level.import(), {"node 'leaf'", "bend the leaf", "Scale that node evenly"});
+    level.node(frame)["scale"] = {2, 2, 2};
+    ASSERT_IMPORTED(level.import());
+    level.node(frame)["scale"] = {1, 1, 2};
+    level.node(leaf).erase("rotation");  // along the scale
+    ASSERT_IMPORTED(level.import());
+}
+
 TEST(SceneElements, CombinationsOfUnknownElementsAreRefused) {
     LevelFile level = levelWithLamp({{"dimmer_light_set", "hall"}});
     level.addNode({{"name", "leaf"}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", "front"}}}});
