@@ -19,11 +19,15 @@ constexpr uint32_t door_points = 256;
 constexpr float flux_share_min = 0.01f;
 // Boxes of patches have some thickness, so that every point sees them from outside.
 constexpr float inflate_m = 0.05f;
-// The door's own box takes this share of the rays where there are patches too.
+// The boxes of the door's leaves take this share of the rays where there are patches too.
 constexpr float door_share = 0.5f;
 // Of the angle between a point's normal and a box, which may reach higher than its middle.
 constexpr float cosine_min = 0.1f;
 constexpr float infinity = std::numeric_limits<float>::infinity();
+// Leaves that are no further apart are of one opening.
+constexpr float same_opening_m = 0.1f;
+// Axes that are so near the world's are the world's.
+constexpr float axis_slack = 1e-3f;
 
 struct Photon {
     glm::vec3 place;
@@ -50,15 +54,80 @@ GuideBox boundsOf(std::span<const Photon> photons) {
     return box;
 }
 
-// Shadow photons: where light of these lamps that passes a point of the door's box lands, as if no door stood anywhere.
-std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t> lamps, const GuideBox& door,
+// Along the largest of these triangles: its normal, and the longer of its two edges that are nearest to a right angle.
+glm::mat3 axesOf(const RayScene& rays, std::span<const uint32_t> triangles) {
+    float largest = 0;
+    glm::mat3 axes(1);
+    for (const uint32_t t : triangles) {
+        const std::array<glm::vec3, 3> p = {rays.corner(t, 0), rays.corner(t, 1), rays.corner(t, 2)};
+        const glm::vec3 normal = glm::cross(p[1] - p[0], p[2] - p[0]);
+        const float area = glm::length(normal);
+        if (!(area > largest)) continue;
+        largest = area;
+        float least = infinity;
+        for (size_t i = 0; i < 3; ++i) {
+            const glm::vec3 a = p[(i + 1) % 3] - p[i], b = p[(i + 2) % 3] - p[i];
+            const float cosine = std::abs(glm::dot(a, b)) / (glm::length(a) * glm::length(b));
+            if (!(cosine < least)) continue;
+            least = cosine;
+            axes[0] = glm::normalize(glm::length(a) > glm::length(b) ? a : b);
+        }
+        axes[2] = normal / area;
+        axes[1] = glm::cross(axes[2], axes[0]);
+    }
+    const auto alongTheWorld = [](glm::vec3 axis) {
+        return std::max(std::abs(axis.x), std::max(std::abs(axis.y), std::abs(axis.z))) > 1 - axis_slack;
+    };
+    const bool world = alongTheWorld(axes[0]) && alongTheWorld(axes[1]) && alongTheWorld(axes[2]);
+    return world ? glm::mat3(1) : axes;
+}
+
+float gapM(const GuideBox& a, const GuideBox& b) {
+    const glm::vec3 apart = glm::max(glm::max(a.low - b.high, b.low - a.high), glm::vec3(0));
+    return std::max(apart.x, std::max(apart.y, apart.z));
+}
+
+// Joins the nearest two, until those that are left are apart and few enough.
+void joinLeaves(std::vector<GuideBox>& leaves) {
+    while (leaves.size() > 1) {
+        size_t first = 0, second = 1;
+        for (size_t i = 0; i < leaves.size(); ++i)
+            for (size_t j = i + 1; j < leaves.size(); ++j)
+                if (gapM(leaves[i], leaves[j]) < gapM(leaves[first], leaves[second])) first = i, second = j;
+        if (gapM(leaves[first], leaves[second]) > same_opening_m && leaves.size() <= leaf_boxes_max) return;
+        include(leaves[first], leaves[second].low);
+        include(leaves[first], leaves[second].high);
+        leaves.erase(leaves.begin() + static_cast<std::ptrdiff_t>(second));
+    }
+}
+
+// The openings of a door whose closed leaves these triangles are.
+GuideBoxes openingsOf(const RayScene& rays, std::span<const uint32_t> triangles) {
+    GuideBoxes door;
+    if (triangles.empty()) return door;
+    door.world_from_box = axesOf(rays, triangles);
+    uint32_t mesh = UINT32_MAX;  // a mesh's triangles follow one another
+    for (const uint32_t t : triangles) {
+        if (rays.triangles()[t].mesh != mesh) door.boxes.push_back(empty());
+        mesh = rays.triangles()[t].mesh;
+        for (int i = 0; i < 3; ++i) include(door.boxes.back(), rays.corner(t, i) * door.world_from_box);
+    }
+    joinLeaves(door.boxes);
+    door.leaves = static_cast<uint32_t>(door.boxes.size());
+    return door;
+}
+
+// Shadow photons: where light of these lamps that passes a point of the door's boxes lands, as if no door stood
+// anywhere; along the axes of those.
+std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t> lamps, const GuideBoxes& door,
                                   uint32_t seed) {
     std::vector<Photon> photons;
     std::vector<Illumination> lit;
     for (uint32_t i = 0; i < door_points; ++i) {
         const glm::vec2 u = sequence2d(i, seed);
         const glm::vec3 within(u, radicalInverse(5, i + 1));
-        const glm::vec3 point = glm::mix(door.low, door.high, within);
+        const GuideBox& leaf = door.boxes[i % door.leaves];
+        const glm::vec3 point = door.world_from_box * glm::mix(leaf.low, leaf.high, within);
         float sum = 0;
         lit.clear();
         for (const uint32_t lamp : lamps) {
@@ -70,14 +139,15 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t
             if (!(flux > flux_share_min * sum)) continue;
             if (!(rays.transmittance(point, l.towards_light, shadowRayLengthM(l), Surfaces::Walls) > 0)) continue;
             const auto hit = rays.nearest(point, -l.towards_light, far_away_m, hash(seed, i), Surfaces::Walls);
-            if (hit && !hit->back) photons.push_back({point - l.towards_light * hit->distance_m, flux});
+            if (hit && !hit->back)
+                photons.push_back({(point - l.towards_light * hit->distance_m) * door.world_from_box, flux});
         }
     }
     return photons;
 }
 
 // Splits the cluster that gains most, across its longest side, until there are enough.
-std::vector<GuideBox> cluster(std::vector<Photon> photons) {
+std::vector<GuideBox> cluster(std::vector<Photon> photons, size_t boxes_max) {
     if (photons.empty()) return {};
     struct Range {
         size_t begin, end;
@@ -88,7 +158,7 @@ std::vector<GuideBox> cluster(std::vector<Photon> photons) {
         }
     };
     std::vector<Range> ranges{{0, photons.size(), boundsOf(photons)}};
-    while (ranges.size() < patch_boxes_max) {
+    while (ranges.size() < boxes_max) {
         auto& widest = *std::ranges::max_element(ranges, {}, &Range::gain);
         if (!(widest.gain() > 0)) break;
         const glm::vec3 d = widest.box.high - widest.box.low;
@@ -114,41 +184,45 @@ DoorGuides::DoorGuides(const RayScene& rays)
     : group_count_(1 + static_cast<uint32_t>(rays.scene().light_sets.size())),
       door_count_(static_cast<uint32_t>(rays.scene().doors.size())) {
     const Scene& scene = rays.scene();
-    std::vector<GuideBox> doors(door_count_, empty());
+    std::vector<std::vector<uint32_t>> leaves(door_count_);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const uint32_t condition = rays.triangles()[t].condition;
         if (condition == no_condition || (condition & 1)) continue;  // where the leaf stands closed, the opening is
-        for (int i = 0; i < 3; ++i) include(doors[condition / 2], rays.corner(t, i));
+        leaves[condition / 2].push_back(t);
+    }
+    for (uint32_t d = 0; d < door_count_; ++d) {
+        boxes_.push_back(openingsOf(rays, leaves[d]));
+        identity_.push_back(d);
     }
     std::vector<std::vector<uint32_t>> lamps(group_count_);
     for (uint32_t l = 0; l < scene.lights.size(); ++l)
         if (scene.lights[l].bake != BakeMode::None) lamps[groupOf(scene.lights[l].light_set)].push_back(l);
     std::vector<std::vector<GuideBox>> patches(size_t{door_count_} * group_count_);
     tbb::parallel_for(size_t{0}, patches.size(), [&](size_t i) {
-        const GuideBox& door = doors[i / group_count_];
-        if (door.low.x <= door.high.x)
+        const auto number = static_cast<uint32_t>(i / group_count_);
+        const GuideBoxes& door = boxes_[number];
+        if (door.leaves > 0)
             patches[i] =
-                cluster(shadowPhotons(rays, lamps[i % group_count_], door, static_cast<uint32_t>(i / group_count_)));
+                cluster(shadowPhotons(rays, lamps[i % group_count_], door, number), guide_boxes_max - door.leaves);
     });
-    for (uint32_t d = 0; d < door_count_; ++d) {
-        boxes_.emplace_back();
-        if (doors[d].low.x <= doors[d].high.x) boxes_.back() = {doors[d]};
-        identity_.push_back(d);
-    }
     for (size_t i = 0; i < patches.size(); ++i) {
         const auto door = static_cast<uint32_t>(i / group_count_), group = static_cast<uint32_t>(i % group_count_);
         guide_of_.push_back(patches[i].empty() ? door : static_cast<uint32_t>(boxes_.size()));
         if (patches[i].empty()) continue;
         boxes_.push_back(boxes_[door]);
-        boxes_.back().insert(boxes_.back().end(), patches[i].begin(), patches[i].end());
+        boxes_.back().boxes.insert(boxes_.back().boxes.end(), patches[i].begin(), patches[i].end());
         group_of_.push_back(group);
         identity_.push_back(hash(hash(door, 1), groupIdentity(scene, group)));
     }
 }
 
-Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal) {
+Guide::Guide(const GuideBoxes& guide, glm::vec3 point, glm::vec3 normal) : world_from_box_(guide.world_from_box) {
     const bool everywhere = normal == glm::vec3(0);
-    std::array<glm::vec3, patch_boxes_max + 1> side_area_m2;
+    point = point * world_from_box_;
+    normal = normal * world_from_box_;
+    const std::span<const GuideBox> boxes = guide.boxes;
+    std::array<glm::vec3, guide_boxes_max> side_area_m2;
+    std::array<bool, guide_boxes_max> is_leaf;
     float patches = 0, door = 0;
     for (size_t b = 0; b < boxes.size(); ++b) {
         const glm::vec3 low = boxes[b].low - point, high = boxes[b].high - point;
@@ -167,11 +241,13 @@ Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal)
                                 normal.z > 0 ? high.z : low.z);
         // A patch on the point's own surface sends nothing there.
         if (!(seen > 0)) continue;
-        if (!everywhere && !(glm::dot(highest, normal) > (b == 0 ? 0 : 2 * inflate_m))) continue;
+        const bool leaf = b < guide.leaves;
+        if (!everywhere && !(glm::dot(highest, normal) > (leaf ? 0 : 2 * inflate_m))) continue;
         const float cosine = everywhere ? 1 : std::max(cosine_min, glm::dot(centre, normal) / std::sqrt(distance2));
         const float largest_m2 = std::max(area_m2.x, std::max(area_m2.y, area_m2.z));
-        chance_[count_] = b == 0 ? 1 : boxes[b].flux / largest_m2 * seen * cosine;
-        (b == 0 ? door : patches) += chance_[count_];
+        chance_[count_] = leaf ? seen : boxes[b].flux / largest_m2 * seen * cosine;
+        (leaf ? door : patches) += chance_[count_];
+        is_leaf[count_] = leaf;
         side_area_m2[count_] = area_m2;
         for (int axis = 0; axis < 3; ++axis) {
             const auto a = static_cast<size_t>(axis);
@@ -184,8 +260,7 @@ Guide::Guide(std::span<const GuideBox> boxes, glm::vec3 point, glm::vec3 normal)
     if (count_ == 0) return;
     const float of_door = door > 0 ? (patches > 0 ? door_share : 1) : 0;
     for (uint32_t i = 0; i < count_; ++i) {
-        const bool is_door = i == 0 && door > 0;
-        chance_[i] = is_door ? of_door : chance_[i] / patches * (1 - of_door);
+        chance_[i] = is_leaf[i] ? chance_[i] / door * of_door : chance_[i] / patches * (1 - of_door);
         for (size_t a = 0; a < 3; ++a)
             if (side_chance_[a][i] > 0)
                 density_m2_[a][i] = chance_[i] * side_chance_[a][i] / side_area_m2[i][static_cast<int>(a)];
@@ -204,14 +279,14 @@ glm::vec3 Guide::sample(float choice, glm::vec2 u) const {
     place[axis] = low_[axis][i] > 0 ? low_[axis][i] : high_[axis][i];
     place[across] = glm::mix(low_[across][i], high_[across][i], u.x);
     place[along] = glm::mix(low_[along][i], high_[along][i], u.y);
-    return glm::normalize(glm::vec3(place[0], place[1], place[2]));
+    return world_from_box_ * glm::normalize(glm::vec3(place[0], place[1], place[2]));
 }
 
 // Eight boxes at a time: this is asked for along every ray, for every guide.
 float Guide::pdf(glm::vec3 direction) const {
     using Eight [[gnu::vector_size(32)]] = float;
     constexpr size_t lanes = sizeof(Eight) / sizeof(float);
-    const glm::vec3 inverse = 1.0f / direction, steepness = glm::abs(inverse);
+    const glm::vec3 inverse = 1.0f / (direction * world_from_box_), steepness = glm::abs(inverse);
     PerTarget share;
     for (size_t i = 0; i < count_; i += lanes) {
         Eight near[3], far[3], density[3];
