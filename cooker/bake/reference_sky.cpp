@@ -35,13 +35,12 @@ glm::vec3 ReferenceSky::sample(float choice, glm::vec2 u) const {
     const auto found = std::ranges::upper_bound(up_to_, static_cast<double>(choice) * flux_);
     const auto texel = static_cast<size_t>(std::min(found, up_to_.end() - 1) - up_to_.begin());
     const auto row = static_cast<double>(texel / image.width), column = static_cast<double>(texel % image.width);
-    const auto y =
-        static_cast<float>(std::lerp(heightAt(image, row), heightAt(image, row + 1), static_cast<double>(u.x)));
-    const float across = std::sqrt(std::max(0.0f, 1 - y * y));
+    // In double: at the zenith 1 - y^2 is next to nothing, and a direction in another row has another density.
+    const double y = std::lerp(heightAt(image, row), heightAt(image, row + 1), static_cast<double>(u.x));
+    const double across = std::sqrt(std::max(0.0, (1 - y) * (1 + y)));
     // Azimuth 0, where +x is, is the image's middle; see skyRadiance.
-    const auto azimuth =
-        static_cast<float>(2 * std::numbers::pi * ((column + static_cast<double>(u.y)) / image.width - 0.5));
-    return {across * std::cos(azimuth), y, across * std::sin(azimuth)};
+    const double azimuth = 2 * std::numbers::pi * ((column + static_cast<double>(u.y)) / image.width - 0.5);
+    return glm::dvec3(across * std::cos(azimuth), y, across * std::sin(azimuth));
 }
 
 float ReferenceSky::pdf(glm::vec3 radiance_cd_m2) const {

@@ -142,8 +142,8 @@ class PlaneGrouper {
     }
 
    private:
-    // The direction, up to right angles, that most of these faces' outer edges have, by length (a square's diagonals
-    // are as good as its sides); empty where that is less than twice as much as lies along the axes.
+    // The direction, up to right angles, that more than half of these faces' outer edges have, by length (a square's
+    // diagonals are as good as its sides); empty where there is none, or it is the axes'.
     std::optional<glm::vec2> alongEdges(std::span<const uint32_t> part) const {
         using Edge = std::array<float, 4>;
         const auto edge = [&](uint32_t i, size_t from, size_t to) {
@@ -170,7 +170,8 @@ class PlaneGrouper {
                 direction[at] = d;
             }
         const auto most = static_cast<size_t>(std::ranges::max_element(length) - length.begin());
-        return length[most] < 2 * length[0] || most == 0 ? std::nullopt : std::optional(direction[most]);
+        const float all = std::accumulate(length.begin(), length.end(), 0.0f);
+        return 2 * length[most] <= all || most == 0 ? std::nullopt : std::optional(direction[most]);
     }
 
     // Edges that lie on one line and overlap with opposite directions: shared edges, T-junctions included.

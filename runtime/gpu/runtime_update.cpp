@@ -227,9 +227,11 @@ bool Runtime::discardRecorded() {
 
 void Runtime::invalidate() {
     impl_->recorded.reset();
+    impl_->stats = {};
+    impl_->timed = false;
     for (uint32_t set = 0; set < impl_->page_sets; ++set) {
-        planner(set).rollbackAll();
-        if (hasProbes()) probePlanner(set).rollbackAll();
+        if (impl_->executor) planner(set).rollbackAll();
+        if (impl_->probes) probePlanner(set).rollbackAll();
     }
     models().rollbackAll();
 }
@@ -242,11 +244,13 @@ Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
     if (!works) return planned;
     impl_->stats = planned;
 
+    const uint32_t list_before = impl_->list;
     auto sent = impl_->takeList(false);
     start = std::chrono::steady_clock::now();
     if (sent) sent = impl_->submitUpdate(planner(impl_->target), plannedProbes(), wait);
     if (!sent) {
         rollback();
+        impl_->list = list_before;
         return std::unexpected(std::move(sent.error()));
     }
     finish();
