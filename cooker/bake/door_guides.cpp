@@ -26,6 +26,8 @@ constexpr float cosine_min = 0.1f;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 // Leaves that are no further apart are of one opening.
 constexpr float same_opening_m = 0.1f;
+// A leaf may be made of many pieces; all pairs of so many are looked at.
+constexpr size_t pieces_max = 64;
 // Axes that are so near the world's are the world's.
 constexpr float axis_slack = 1e-3f;
 
@@ -82,19 +84,24 @@ glm::mat3 axesOf(const RayScene& rays, std::span<const uint32_t> triangles) {
     return world ? glm::mat3(1) : axes;
 }
 
+float largestSideM2(const GuideBox& box) {
+    const glm::vec3 d = box.high - box.low;
+    return std::max(d.x * d.y, std::max(d.y * d.z, d.z * d.x));
+}
+
 float gapM(const GuideBox& a, const GuideBox& b) {
     const glm::vec3 apart = glm::max(glm::max(a.low - b.high, b.low - a.high), glm::vec3(0));
     return std::max(apart.x, std::max(apart.y, apart.z));
 }
 
-// Joins the nearest two, until those that are left are apart and few enough.
-void joinLeaves(std::vector<GuideBox>& leaves) {
+// Joins the nearest two, until those that are left are apart and no more than `most`.
+void joinLeaves(std::vector<GuideBox>& leaves, size_t most) {
     while (leaves.size() > 1) {
         size_t first = 0, second = 1;
         for (size_t i = 0; i < leaves.size(); ++i)
             for (size_t j = i + 1; j < leaves.size(); ++j)
                 if (gapM(leaves[i], leaves[j]) < gapM(leaves[first], leaves[second])) first = i, second = j;
-        if (gapM(leaves[first], leaves[second]) > same_opening_m && leaves.size() <= leaf_boxes_max) return;
+        if (gapM(leaves[first], leaves[second]) > same_opening_m && leaves.size() <= most) return;
         include(leaves[first], leaves[second].low);
         include(leaves[first], leaves[second].high);
         leaves.erase(leaves.begin() + static_cast<std::ptrdiff_t>(second));
@@ -108,11 +115,14 @@ GuideBoxes openingsOf(const RayScene& rays, std::span<const uint32_t> triangles)
     door.world_from_box = axesOf(rays, triangles);
     uint32_t mesh = UINT32_MAX;  // a mesh's triangles follow one another
     for (const uint32_t t : triangles) {
-        if (rays.triangles()[t].mesh != mesh) door.boxes.push_back(empty());
+        if (rays.triangles()[t].mesh != mesh) {
+            if (door.boxes.size() > pieces_max) joinLeaves(door.boxes, pieces_max);
+            door.boxes.push_back(empty());
+        }
         mesh = rays.triangles()[t].mesh;
         for (int i = 0; i < 3; ++i) include(door.boxes.back(), rays.corner(t, i) * door.world_from_box);
     }
-    joinLeaves(door.boxes);
+    joinLeaves(door.boxes, leaf_boxes_max);
     door.leaves = static_cast<uint32_t>(door.boxes.size());
     return door;
 }
@@ -123,10 +133,15 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t
                                   uint32_t seed) {
     std::vector<Photon> photons;
     std::vector<Illumination> lit;
+    float area_m2 = 0;
+    for (uint32_t l = 0; l < door.leaves; ++l)
+        area_m2 += largestSideM2(door.boxes[l]) / static_cast<float>(door.leaves);
     for (uint32_t i = 0; i < door_points; ++i) {
         const glm::vec2 u = sequence2d(i, seed);
         const glm::vec3 within(u, radicalInverse(5, i + 1));
         const GuideBox& leaf = door.boxes[i % door.leaves];
+        // Each leaf has as many points, whatever its size.
+        const float share = area_m2 > 0 ? largestSideM2(leaf) / area_m2 : 1;
         const glm::vec3 point = door.world_from_box * glm::mix(leaf.low, leaf.high, within);
         float sum = 0;
         lit.clear();
@@ -135,12 +150,12 @@ std::vector<Photon> shadowPhotons(const RayScene& rays, std::span<const uint32_t
             sum += luminance(lit.back().irradiance_lux);
         }
         for (const Illumination& l : lit) {
-            const float flux = luminance(l.irradiance_lux);
-            if (!(flux > flux_share_min * sum)) continue;
+            const float lux = luminance(l.irradiance_lux);
+            if (!(lux > flux_share_min * sum)) continue;
             if (!(rays.transmittance(point, l.towards_light, shadowRayLengthM(l), Surfaces::Walls) > 0)) continue;
             const auto hit = rays.nearest(point, -l.towards_light, far_away_m, hash(seed, i), Surfaces::Walls);
             if (hit && !hit->back)
-                photons.push_back({(point - l.towards_light * hit->distance_m) * door.world_from_box, flux});
+                photons.push_back({(point - l.towards_light * hit->distance_m) * door.world_from_box, lux * share});
         }
     }
     return photons;

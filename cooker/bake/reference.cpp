@@ -131,7 +131,7 @@ float ReferenceTracer::weigh(const Sources& s, glm::vec3 p, std::vector<float>& 
 }
 
 ReferenceTracer::ReferenceTracer(const RayScene& rays, const ReferenceOptions& options)
-    : rays_(rays), options_(options), sky_(rays.scene()) {
+    : rays_(rays), options_(options), sky_(rays.scene(), options.always_weight != 0) {
     const Scene& scene = rays.scene();
     for (uint32_t i = 0; i < scene.lights.size(); ++i) {
         const PunctualLight& light = scene.lights[i];
@@ -281,7 +281,7 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
 
 // By the sky's own directions: a sun in the picture is small, and paths hardly ever leave the level towards it.
 glm::vec3 ReferenceTracer::skyLight(const Vertex& vertex, Path& path) const {
-    if (sky_.empty() || options_.always_weight == 0) return glm::vec3(0);
+    if (sky_.empty()) return glm::vec3(0);
     const float choice = path.next();
     const glm::vec3 direction = sky_.sample(choice, path.next2());
     const float cos_surface = vertex.cosine(direction);

@@ -16,8 +16,8 @@ double heightAt(const Image& image, double row) {
 
 }  // namespace
 
-ReferenceSky::ReferenceSky(const Scene& scene) : scene_(scene) {
-    if (!scene.sky_image) return;
+ReferenceSky::ReferenceSky(const Scene& scene, bool wanted) : scene_(scene) {
+    if (!wanted || !scene.sky_image) return;
     const Image& image = *scene.sky_image;
     up_to_.reserve(image.texels.size());
     for (uint32_t y = 0; y < image.height; ++y) {

@@ -11,9 +11,10 @@ namespace dimmer::cook {
 
 class ReferenceSky {
    public:
-    explicit ReferenceSky(const Scene& scene);
+    // `wanted`: else there is nothing to draw from, and no table.
+    ReferenceSky(const Scene& scene, bool wanted);
 
-    // No image, or a black one: there is nothing to draw from.
+    // Not wanted, no image, or a black one.
     bool empty() const { return !(flux_ > 0); }
     // Unit direction; `choice` picks the texel, `u` the place in it; all in [0, 1).
     glm::vec3 sample(float choice, glm::vec2 u) const;

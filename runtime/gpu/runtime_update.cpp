@@ -152,12 +152,15 @@ void Runtime::planProbes(UpdateStats& stats) {
 // What the next update will do. False: there is nothing to execute, and the last update's figures stand; `stats` may
 // still say what was put off.
 bool Runtime::planNext(UpdateStats& stats) {
+    const auto start = std::chrono::steady_clock::now();
     Impl& impl = *impl_;
     impl.texels_planned = impl.probes_planned = impl.models_planned = false;
     planTexels(stats);
     planProbes(stats);
+    stats.host_us = microsecondsSince(start);
     if (!impl.texels_planned && !impl.probes_planned && !impl.models_planned) return false;
     impl.recorded.reset();
+    impl.stats = stats;
     impl.timed = false;
     return true;
 }
@@ -182,18 +185,14 @@ void Runtime::finish() {
 }
 
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
-    auto start = std::chrono::steady_clock::now();
     UpdateStats planned;
-    const bool works = planNext(planned);
-    planned.host_us = microsecondsSince(start);
-    if (!works) return planned;
-    impl_->stats = planned;
+    if (!planNext(planned)) return planned;
     const uint32_t list_before = impl_->list;
     if (auto taken = impl_->takeList(true); !taken) {
         rollback();
         return std::unexpected(std::move(taken.error()));
     }
-    start = std::chrono::steady_clock::now();
+    const auto start = std::chrono::steady_clock::now();
     impl_->recordUpdate(commands, planner(impl_->target), plannedProbes(), true);
     impl_->recorded = Impl::Recording{.texels = impl_->texels_planned,
                                       .probes = impl_->probes_planned,
@@ -237,16 +236,11 @@ void Runtime::invalidate() {
 }
 
 Expected<UpdateStats> Runtime::submit(const SubmitWait& wait) {
-    auto start = std::chrono::steady_clock::now();
     UpdateStats planned;
-    const bool works = planNext(planned);
-    planned.host_us = microsecondsSince(start);
-    if (!works) return planned;
-    impl_->stats = planned;
-
+    if (!planNext(planned)) return planned;
     const uint32_t list_before = impl_->list;
     auto sent = impl_->takeList(false);
-    start = std::chrono::steady_clock::now();
+    const auto start = std::chrono::steady_clock::now();
     if (sent) sent = impl_->submitUpdate(planner(impl_->target), plannedProbes(), wait);
     if (!sent) {
         rollback();

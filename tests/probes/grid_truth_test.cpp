@@ -37,8 +37,8 @@ TEST(GridTruth, TwoRooms) {
     const double floor_lux = truthFloor(readTruth("two_rooms.free.all_on"));
     constexpr std::pair<const char*, const char*> states[] = {
         {"all_on", ""}, {"all_off", "all=0"}, {"only_first", "all=0,desk=1"}, {"door_0", "door:mid=1"}};
-    // Where 58 probes end up is chaotic, and what a single point behind a wall finds is the mean of a state with one
-    // lamp: the middle one of five placements is asked for.
+    // Where 58 probes end up is chaotic: five placements. All must do, but for one figure: with one lamp what a single
+    // point behind a wall finds is the mean of the state (26 % in two of these), and there the middle one must.
     std::map<std::string, std::vector<double>> means, p95s;
     for (const float spacing_m : {0.26f, 0.28f, 0.3f, 0.32f, 0.34f}) {
         SilentProgress progress;
@@ -66,9 +66,12 @@ TEST(GridTruth, TwoRooms) {
         return of[2];
     };
     // The goals for our own levels are 8 and 25 %, at final.
+    EXPECT_LE(middle(means["only_first"]), 0.10);
     for (const auto& [name, state] : states) {
-        EXPECT_LE(middle(means[name]), 0.10) << name;
-        EXPECT_LE(middle(p95s[name]), 0.33) << name;
+        if (name != std::string("only_first")) {
+            EXPECT_LE(std::ranges::max(means[name]), 0.10) << name;
+        }
+        EXPECT_LE(std::ranges::max(p95s[name]), 0.33) << name;
     }
 }
 

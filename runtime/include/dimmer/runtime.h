@@ -87,8 +87,8 @@ struct LoadProgress {
 
 // What an update of submit() waits for: a semaphore that says that the frames which read what it writes are done.
 // Timeline semaphores only: where nothing changed nothing waits, and a binary semaphore would stay signalled. A value
-// that nobody ever signals blocks for ever, as nothing here has a time limit: wait(), readPages(), the next record() or
-// submit() that finds work, and the destructor.
+// that nobody ever signals blocks for ever, as nothing here has a time limit: wait(), readPages(), a record() or
+// submit() that finds work and takes the same work list (with one frame in flight the next), and the destructor.
 struct SubmitWait {
     VkSemaphore semaphore = VK_NULL_HANDLE;  // null: nothing
     uint64_t value = 0;
