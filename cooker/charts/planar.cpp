@@ -370,31 +370,34 @@ class PlaneGrouper {
 }  // namespace
 
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
+                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked, Along along) {
     std::map<PlaneKey, std::vector<uint32_t>> planes;
     for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
     std::vector<PlanarChart> charts;
-    const auto chart = [&](PlaneGrouper& plane) {
-        std::ranges::move(plane.charts(blocked), std::back_inserter(charts));
+    const auto chart = [&](PlaneGrouper& plane, bool turned) {
+        for (PlanarChart& made : plane.charts(blocked)) {
+            made.turned = turned;
+            charts.push_back(std::move(made));
+        }
     };
     for (auto& [key, ids] : planes) {
         const Axes axes(faces[ids[0]].normal);
         PlaneGrouper plane(faces, ids, axes, side_max_texels);
-        auto turned = plane.turned();
+        auto turned = along == Along::Edges ? plane.turned() : decltype(plane.turned()){};
         if (turned.empty()) {
-            chart(plane);
+            chart(plane, false);
             continue;
         }
         std::set<uint32_t> others;
         for (auto& [own_axes, part] : turned) {
             others.insert(part.begin(), part.end());
             PlaneGrouper own(faces, std::move(part), own_axes, side_max_texels);
-            chart(own);
+            chart(own, true);
         }
         std::erase_if(ids, [&](uint32_t id) { return others.contains(id); });
         if (ids.empty()) continue;
         PlaneGrouper rest(faces, std::move(ids), axes, side_max_texels);
-        chart(rest);
+        chart(rest, false);
     }
     // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
     std::ranges::sort(charts, {}, [](const PlanarChart& c) { return c.faces[0]; });

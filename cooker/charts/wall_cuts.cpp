@@ -85,12 +85,14 @@ class WallCutter {
         blocking_boxes_ = BoxTree(std::move(boxes));
     }
 
-    void run() {
+    // Along::Edges: charts that are turned alone; the others have been cut before.
+    void run(Along along) {
         constexpr uint32_t no_side_limit = 1u << 20;
-        const auto charts = planarCharts(std::span(faces_).first(cuttable_), no_side_limit, {});
+        auto charts = planarCharts(std::span(faces_).first(cuttable_), no_side_limit, {}, along);
+        if (along == Along::Edges) std::erase_if(charts, [](const PlanarChart& chart) { return !chart.turned; });
         std::vector<std::vector<std::vector<Piece>>> parts(charts.size());
         tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
-        uint32_t region = 0;
+        uint32_t region = last_region_;
         std::map<uint32_t, Replacements> by_mesh;
         for (size_t c = 0; c < charts.size(); ++c) {
             if (parts[c].size() < 2) continue;
@@ -112,6 +114,10 @@ class WallCutter {
     };
     using Replacements = std::map<uint32_t, std::vector<Replacement>>;
 
+    static uint32_t regionOf(const SceneMesh& mesh, uint32_t triangle) {
+        return mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[triangle];
+    }
+
     static float largest(glm::vec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
     void addFaces(bool of_unwraps, float texels_per_metre) {
@@ -124,7 +130,10 @@ class WallCutter {
                 const glm::vec3 normal = glm::normalize(glm::cross(c[1] - c[0], c[2] - c[0]));
                 if (scene_.materials[mesh.triangle_materials[t]].alpha_mode == AlphaMode::Opaque)
                     blocking_.push_back(static_cast<uint32_t>(faces_.size()));
-                faces_.push_back({c, normal, mesh.texels_per_metre.value_or(texels_per_metre), chartGroup(mesh)});
+                const uint32_t region = regionOf(mesh, t);
+                last_region_ = std::max(last_region_, region);
+                faces_.push_back(
+                    {c, normal, mesh.texels_per_metre.value_or(texels_per_metre), chartGroup(mesh), region});
                 sources_.push_back({m, t});
             }
         }
@@ -357,7 +366,7 @@ class WallCutter {
             if (it == replacements.end()) {
                 triangles.push_back(index);
                 materials.push_back(mesh.triangle_materials[t]);
-                regions.push_back(0);
+                regions.push_back(regionOf(mesh, t));
                 continue;
             }
             for (const Replacement& r : it->second) {
@@ -405,13 +414,15 @@ class WallCutter {
     std::vector<uint32_t> blocking_;  // faces, ascending
     BoxTree blocking_boxes_;          // theirs
     float largest_m_ = 0;             // coordinate among theirs
+    uint32_t last_region_ = 0;        // that an earlier cut made
 };
 
 }  // namespace
 
 void cutAtWalls(Scene& scene, float texels_per_metre) {
     dropInvalidUnwraps(scene);
-    WallCutter(scene, texels_per_metre).run();
+    // Along each plane's own axes, as most levels are built, and then along those of what is turned against them.
+    for (const Along along : {Along::Plane, Along::Edges}) WallCutter(scene, texels_per_metre).run(along);
 }
 
 }  // namespace dimmer::cook

@@ -8,6 +8,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include <map>
+#include <span>
 
 namespace dimmer::cook::test {
 namespace {
@@ -79,6 +80,30 @@ TEST(WallCuts, RoomsThatAreTurnedShareNoChart) {
         ASSERT_TRUE(charts.has_value());
         expectRoomsApart(rays, *charts, turned);
     }
+}
+
+// A hall of another outline: walls along the world's axes part its floor as they always did.
+TEST(WallCuts, WallsPartAFloorWhoseOutlineIsTurned) {
+    Scene scene = twoRooms();
+    std::erase_if(scene.meshes, [](const SceneMesh& mesh) { return mesh.node == "floor" || mesh.node == "ceiling"; });
+    const glm::mat3 diamond(glm::rotate(glm::mat4(1), glm::radians(45.0f), {0, 1, 0}));
+    for (const float y : {-0.1f, 2.8f}) {
+        const size_t first = scene.meshes.size();
+        addSolid(scene, "slab", {0, 0, 0}, {3, 0.1f, 3}, 0);
+        for (SceneMesh& side : std::span(scene.meshes).subspan(first)) {
+            // Off the middle, so that no triangle ends at the wall.
+            for (glm::vec3& p : side.positions_m) p = diamond * p + glm::vec3(0.5f, y, 0);
+            for (glm::vec3& n : side.normals) n = diamond * n;
+        }
+    }
+    // The wall reaches from corner to corner: what is beside twoRooms()' own ends parts the rooms too.
+    for (const float side : {-1.0f, 1.0f})
+        addSolid(scene, "wall", {0, 1.35f, side * 2.95f}, {half_wall_m, 1.35f, 1.45f}, 0);
+    cutAtWalls(scene, 4);
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+    ASSERT_TRUE(charts.has_value());
+    expectRoomsApart(rays, *charts);
 }
 
 // UVs that are no unwrap are as good as none, and said to be none.
