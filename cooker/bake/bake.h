@@ -27,7 +27,7 @@ struct GridSettings {
 struct BakeSettings {
     uint32_t series_rays = 32;     // per texel, for the bounces; kept as links of 2 to 3 bytes while the series runs
     uint32_t final_rays = 128;     // per texel and term at most, for what is stored
-    uint32_t emitter_samples = 8;  // per series_rays or round of final rays, towards each light group's emitters
+    uint32_t emitter_samples = 8;  // per round of final rays, towards each light group's emitters
     float noise_max = 0;           // a term's rays at a texel end when the 95 % interval is within this share; 0: never
     bool denoise = false;          // filter what noise is left, in lightmap space
     bool sharpen = false;          // texels as bilinear filtering needs them (bake/sharpen.h), not their means

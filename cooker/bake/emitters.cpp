@@ -154,9 +154,8 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
         const glm::vec3 world = t * d.x + b * d.y + normal * d.z;
         const glm::vec3 from =
             pointOn(e, onTriangle(sequence2d(own, hash(seed, 2 * e.triangle + 1)))) + normal * lift_m;
-        // Through doors: what is behind them is lit once they open.
-        const auto hit = rays.nearest(from, world, far_m, hash(seed, i), Surfaces::Walls);
-        grid_.mark(from, world, hit ? hit->distance_m : far_m, spread, marks);
+        // Through doors, as what is behind them is lit once they open, and through panes, however little they let by.
+        grid_.mark(from, world, rays.reach(from, world, far_m, Surfaces::Walls), spread, marks);
     }
     return marks;
 }

@@ -77,11 +77,10 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
     const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));
     std::vector<uint8_t> marks(grid_.count());
     for (uint32_t i = 0; i < light_probe_rays; ++i) {
-        // Through doors: what is behind them is lit once they open.
+        // Through doors, as what is behind them is lit once they open, and through panes, however little they let by.
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
         const glm::vec3 from = light.position_m + d * lamp_lift_m;
-        const auto hit = rays.nearest(from, d, far_m, hash(identity_[index], i), Surfaces::Walls);
-        grid_.mark(from, d, hit ? hit->distance_m : far_m, spread, marks);
+        grid_.mark(from, d, rays.reach(from, d, far_m, Surfaces::Walls), spread, marks);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)

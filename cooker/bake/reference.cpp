@@ -300,7 +300,8 @@ std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit)
     if (hit.back && !material.double_sided) return std::nullopt;
     if (rays_.scene().meshes[triangle.mesh].lighting == Lighting::None) return std::nullopt;
     const glm::vec3 normal = hit.back ? -triangle.normal : triangle.normal;
-    return Vertex{.point = rays_.pointOn(hit.triangle, hit.u, hit.v) + normal * path_offset_m,
+    const glm::vec3 point = rays_.pointOn(hit.triangle, hit.u, hit.v);
+    return Vertex{.point = point + normal * liftOff(point, path_offset_m),
                   .normal = normal,
                   .reflectance = material.reflectance(glm::vec3(rays_.surfaceColor(hit.triangle, hit.u, hit.v)))};
 }
@@ -358,7 +359,8 @@ ReferenceValue ReferenceTracer::irradiance(const ReferencePoint& point, uint32_t
 ReferenceTracer::Start ReferenceTracer::startAt(const ReferencePoint& point) const {
     Start start;
     const bool on_surface = point.surface != glm::vec3(0);
-    start.vertex.point = point.position_m + (on_surface ? point.surface : point.normal) * path_offset_m;
+    start.vertex.point =
+        point.position_m + (on_surface ? point.surface : point.normal) * liftOff(point.position_m, path_offset_m);
     start.vertex.normal = point.normal;
     start.vertex.horizon = point.surface;
     start.direct_lux = directPart(start.vertex);

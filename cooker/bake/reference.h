@@ -12,7 +12,7 @@
 
 namespace dimmer::cook {
 
-// How far off a surface paths start.
+// How far off a surface paths start, at least: liftOff().
 inline constexpr float path_offset_m = 2e-4f;
 
 // Which light is asked for.

@@ -3,6 +3,7 @@
 #include <bake/activity.h>
 #include <bake/direct.h>
 #include <bake/door_pairs.h>
+#include <bake/final_gather.h>
 #include <bake/links.h>
 #include <bake/sampling.h>
 #include <bake/sums.h>
@@ -26,6 +27,15 @@ constexpr float door_lingering_share = 0.1f;
 // Few rays find their way through a door, and what they find there is spread over the whole room by the bounces that
 // follow, where no later ray mends it. So many times as many look for doors alone.
 constexpr uint32_t door_rays_per_ray = 1;
+
+// What a texel sends back of an emitter is asked for once, of a few of its points: that many samples more than a round
+// of the final gather takes, or a lamp of centimetres beside a wall lights a room by as much as chance finds of it.
+constexpr uint32_t emitter_samples_more = 4;
+
+uint32_t samplesOfEmitters(const BakeSettings& settings) {
+    const uint32_t by_rays = emitter_samples_more * settings.emitter_samples * settings.series_rays / rays_per_round;
+    return std::max(settings.emitter_samples, by_rays);
+}
 
 // After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
 // shrink evenly yet, later there is less to gain.
@@ -94,7 +104,7 @@ class Expansion {
         GatherOptions options;
         options.rays = settings_.series_rays;
         options.door_rays = door_rays_per_ray * settings_.series_rays;
-        options.emitter_samples = settings_.emitter_samples;
+        options.emitter_samples = samplesOfEmitters(settings_);
         options.seed = settings_.seed;
         options.wanted_in_group = followed_in_group_;
         SparseLight::Builder direct(receivers_), left_to_renderer(receivers_);

@@ -13,8 +13,8 @@
 namespace dimmer::cook {
 namespace {
 
-// Rays and shadow rays start this far off the surface: above the rounding of coordinates at 100 m (8e-6 m) and the
-// mismatch of coplanar pieces, below any gap that matters.
+// Rays and shadow rays start this far off the surface (liftOff()): above the rounding of coordinates at 100 m (8e-6 m)
+// and the mismatch of coplanar pieces, below any gap that matters.
 constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
@@ -134,8 +134,8 @@ class TexelSampler {
 
     void tryPoint(const SurfacePoint& s, Usable& usable, Result& result) const {
         const uint32_t triangle = unwrap_.faces[s.face].triangle;
-        const glm::vec3 position =
-            rays_.pointOn(triangle, s.weights.x, s.weights.y) + unwrap_.frames[s.face].normal * lift_m;
+        const glm::vec3 on_surface = rays_.pointOn(triangle, s.weights.x, s.weights.y);
+        const glm::vec3 position = on_surface + unwrap_.frames[s.face].normal * liftOff(on_surface, lift_m);
         addReflectance(s, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };

@@ -118,7 +118,7 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
             if (glm::dot(bake.level->charts.frames[sample.face].normal, p.frame.normal) < same_normal_cos) continue;
             if (!(distance < nearest)) continue;
             nearest = distance;
-            out.centre = {{p.position_m + path_offset_m * p.frame.normal, sample.face}};
+            out.centre = {{p.position_m + liftOff(p.position_m, path_offset_m) * p.frame.normal, sample.face}};
         }
     }
     normalize(out.stored);

@@ -40,9 +40,11 @@ bool isShared(const Scene& scene, uint32_t material, uint32_t group) {
     return false;
 }
 
+// Nor is what is divided by the scale of lamps that nobody would see beside it: it would overflow.
 void fillBlackChannels(glm::vec3& scale, glm::vec3 light) {
+    constexpr float unseen = 1e-12f;
     for (int c = 0; c < 3; ++c)
-        if (!(scale[c] > 0)) scale[c] = light[c];
+        if (!(scale[c] > unseen * light[c])) scale[c] = light[c];
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cstring>
 #include <span>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -64,6 +65,26 @@ class MemoryInput : public Imf::IStream {
     size_t at_ = 0;
 };
 
+Expected<Image> sized(const Imath::Box2i& window, const std::string& file) {
+    return sized(int64_t{window.max.x} - window.min.x + 1, int64_t{window.max.y} - window.min.y + 1, file);
+}
+
+// The picture is what is displayed: files may keep less of it, where the rest is black, or more.
+Expected<Image> displayed(Image kept, const Imath::Box2i& window, const Imath::Box2i& display,
+                          const std::string& file) {
+    if (window == display) return kept;
+    auto image = sized(display, file);
+    if (!image) return image;
+    const int64_t first_x = std::max(window.min.x, display.min.x), last_x = std::min(window.max.x, display.max.x);
+    const int64_t first_y = std::max(window.min.y, display.min.y), last_y = std::min(window.max.y, display.max.y);
+    if (last_x < first_x) return image;
+    for (int64_t y = first_y; y <= last_y; ++y)
+        std::copy_n(kept.texels.begin() + (y - window.min.y) * kept.width + (first_x - window.min.x),
+                    last_x - first_x + 1,
+                    image->texels.begin() + (y - display.min.y) * image->width + (first_x - display.min.x));
+    return image;
+}
+
 Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::string& file) {
     try {
         // A hostile header must not make the library reserve a table of four billion rows.
@@ -74,7 +95,7 @@ Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::s
         for (const char* name : {"R", "G", "B"})
             if (!input.header().channels().findChannel(name))
                 return refuse(file, "has no channels R, G and B. Save it as a plain RGB image.");
-        auto image = sized(int64_t{window.max.x} - window.min.x + 1, int64_t{window.max.y} - window.min.y + 1, file);
+        auto image = sized(window, file);
         if (!image) return image;
         // A slice's base is where texel (0, 0) would lie, which the window need not hold: unsigned arithmetic wraps.
         const size_t row_bytes = image->width * sizeof(glm::vec4);
@@ -87,7 +108,7 @@ Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::s
                                           sizeof(glm::vec4), row_bytes));
         input.setFrameBuffer(frame);
         input.readPixels(window.min.y, window.max.y);
-        return image;
+        return displayed(std::move(*image), window, input.header().displayWindow(), file);
     } catch (const std::bad_alloc&) {
         throw;  // importLevel says what that means
     } catch (const std::exception& problem) {

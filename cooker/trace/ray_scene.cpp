@@ -270,6 +270,18 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     return found;
 }
 
+float RayScene::reach(glm::vec3 origin, glm::vec3 direction, float distance_max_m, Surfaces surfaces) const {
+    float from_m = 0;
+    for (int layer = 0; layer <= transparent_layers_max; ++layer) {
+        const auto hit = nearest(origin + direction * from_m, direction, distance_max_m - from_m, 0, surfaces);
+        if (!hit) return distance_max_m;
+        const bool stopped = !(alphaAt(hit->triangle, hit->u, hit->v) < 1);
+        if (stopped) return from_m + hit->distance_m;
+        from_m = behind(from_m + hit->distance_m);
+    }
+    return distance_max_m;
+}
+
 Hit RayScene::hitOf(uint32_t triangle, float distance_m, float u, float v, glm::vec3 direction) const {
     return {triangle, distance_m, u, v, glm::dot(direction, triangles_[triangle].normal) > 0};
 }

@@ -4,9 +4,12 @@
 #include <scene/scene.h>
 #include <trace/leaf_boxes.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -34,6 +37,12 @@ struct LevelTriangle {
 
 // What stops a ray: everything, with every leaf where it stands; or only what is always there.
 enum class Surfaces { All, Walls };
+
+// How far off a surface rays from a point of it start: so far, or further where floats are coarser than that.
+inline float liftOff(glm::vec3 point, float least_m) {
+    constexpr float share = 4 * std::numeric_limits<float>::epsilon();
+    return std::max(least_m, share * std::max({std::abs(point.x), std::abs(point.y), std::abs(point.z)}));
+}
 
 struct Hit {
     uint32_t triangle = 0;  // into RayScene::triangles()
@@ -74,6 +83,9 @@ class RayScene {
     std::optional<Hit> nearest(glm::vec3 origin, glm::vec3 direction, float distance_max_m, uint32_t seed,
                                Surfaces surfaces = Surfaces::All, uint32_t ignored = no_model,
                                LeafHits* leaves = nullptr) const;
+
+    // How far any light gets along a ray at most: to the nearest surface that lets none of it pass.
+    float reach(glm::vec3 origin, glm::vec3 direction, float distance_max_m, Surfaces surfaces) const;
 
     // The share of light, 0..1, that passes from `origin` along `direction` for `distance_m`. `leaves`: as above, where
     // some does.

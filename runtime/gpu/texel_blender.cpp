@@ -104,12 +104,16 @@ Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& trans
     RecordQueue queue(data.contributions.size());
     for (uint32_t k = 0; k < data.contributions.size(); ++k) {
         if (!all && data.contributions[k].light_set) continue;
-        if (!records_.reserve(k))
+        if (!records_.reserve(k)) {
+            uint64_t bytes = 0;
+            for (uint32_t c = 0; c < data.contributions.size(); ++c)
+                if (all || !data.contributions[c].light_set) bytes += records_.byteCount(c);
             return fail(ErrorCode::OutOfMemory,
-                        fmt::format("The records that are loaded at the start have no room: contribution {} has {} "
-                                    "bytes of them, {} are free. Create the runtime with more records_bytes_max, or, "
-                                    "where light sets are to come and go, with load_records = false.",
-                                    k, records_.byteCount(k), records_.freeBytes()));
+                        fmt::format("The records that are loaded at the start, {}, take {} bytes: create the runtime "
+                                    "with a records_bytes_max of as many at least{}.",
+                                    all ? "all of them" : "those of always-on light that doors let through", bytes,
+                                    all ? ", or, where light sets are to come and go, with load_records = false" : ""));
+        }
         queue.add(RecordQueue::no_light_set, k, records_);
     }
     std::vector<VkBufferCopy> regions;

@@ -16,6 +16,7 @@ float hingedDoorWeight(float angle_rad, float angle_max_rad) {
 }
 
 float slidingDoorWeight(float travel_m, float width_m) {
+    if (std::isnan(travel_m) || std::isnan(width_m)) return travel_m + width_m;
     if (!(width_m > 0)) return travel_m > 0 ? 1.0f : 0.0f;
     return std::clamp(travel_m / width_m, 0.0f, 1.0f);
 }

@@ -80,6 +80,24 @@ TEST(LightGrid, WhatIsSeenItselfOrFarOutsideIsAskedForEverywhere) {
     EXPECT_EQ(askedAt(LightGrid(rays), {0, 0, 0}), (std::set<uint32_t>{}));
 }
 
+// Whatever stops light is the shadow rays' to say: of the few rays that find the window hardly any would pass its pane.
+TEST(LightGrid, WhatHidesAllButALittleHidesNothing) {
+    Scene scene;
+    addFloor(scene, 12, addMaterial(scene, lambert(0.5f)));
+    Material glass = lambert(0.5f);
+    glass.alpha_mode = AlphaMode::Blend;
+    glass.alpha = 0.99f;
+    const uint32_t pane = addMaterial(scene, glass);
+    addQuad(scene, "two panes", {0, 6, 0}, {0, 6, 0}, {0, 0, 12}, pane);
+    addQuad(scene, "two panes", {0.1f, 6, 0}, {0, 6, 0}, {0, 0, 12}, pane);
+    addPointLight(scene, {-6, 1, 0}, 100, BakeMode::Indirect);
+    const LightGrid behind_glass{RayScene(scene)};
+    EXPECT_EQ(listedAt(behind_glass, {9, 0, 0}), std::set<uint32_t>{0});
+    scene.materials[pane].alpha_mode = AlphaMode::Opaque;
+    const LightGrid behind_a_wall{RayScene(scene)};
+    EXPECT_EQ(listedAt(behind_a_wall, {3, 0, 0}), std::set<uint32_t>{});
+}
+
 // Neighbouring rays are 3 m apart where they meet the far end of this street, further than cells are wide.
 TEST(LightGrid, NothingIsMissedInTheOpen) {
     Scene scene;

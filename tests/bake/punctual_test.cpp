@@ -54,6 +54,23 @@ TEST(Punctual, SpotFallsOffBetweenItsCones) {
     EXPECT_EQ(share(-1), 0);
 }
 
+// Within its inner cone a spot has its intensity, however narrow both are; a hard edge between equal angles.
+TEST(Punctual, NarrowSpotsAreAsBrightAsWideOnes) {
+    PunctualLight light = lamp(LightType::Spot);
+    constexpr float degree = std::numbers::pi_v<float> / 180;
+    for (const auto& [inner, outer] : {std::pair(1.0f, 1.5f), std::pair(0.0f, 0.5f), std::pair(2.0f, 2.0f)}) {
+        light.cone_inner_cos = std::cos(inner * degree);
+        light.cone_outer_cos = std::cos(outer * degree);
+        const auto at = [&](float angle) {
+            return illuminate(light, 2.0f * glm::vec3(std::sin(angle), -std::cos(angle), 0)).irradiance_lux.x;
+        };
+        // Cosines of floats are coarse: inside of 0.5 degrees by 6e-8 of 3.8e-5.
+        EXPECT_NEAR(at(0), 25, 0.2) << outer;
+        EXPECT_NEAR(at(0.9f * inner * degree), 25, 0.2) << outer;
+        EXPECT_EQ(at((outer + 0.1f) * degree), 0) << outer;
+    }
+}
+
 TEST(Punctual, SunIsTheSameEverywhere) {
     const PunctualLight light = lamp(LightType::Directional);
     for (const glm::vec3 p : {glm::vec3(0), glm::vec3(1e4f, -3, 7)}) {

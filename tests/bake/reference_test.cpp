@@ -123,6 +123,25 @@ TEST(Reference, ManyLampsAddUp) {
     expectLux(trace(many, {0, 0, 0}, up, 40000), expected, 0.01);
 }
 
+// Where a step of floats is 0.5 or 1 mm paths still start off the surface, and a room stays as bright as at home.
+TEST(Reference, FarFromTheOriginNothingChanges) {
+    const auto roomAt = [](float x) {
+        Scene scene;
+        addBox(scene, {2, 1, 2}, addMaterial(scene, lambert(0.5f)));
+        for (SceneMesh& mesh : scene.meshes)
+            for (glm::vec3& p : mesh.positions_m) p.x += x;
+        addPointLight(scene, {x + 0.5f, 0.25f, 0.5f}, 100, BakeMode::Indirect);
+        return scene;
+    };
+    for (const glm::vec3 place : {glm::vec3(-0.5f, -1, 0.5f), glm::vec3(1.5f, -1, -1.5f)}) {
+        const ReferenceValue home = trace(roomAt(0), place, up, 20000);
+        ASSERT_GT(home.irradiance_lux.x, 1);
+        for (const float x : {4500.0f, -10000.0f})
+            expectLux(trace(roomAt(x), place + glm::vec3(x, 0, 0), up, 20000),
+                      static_cast<double>(home.irradiance_lux.x), 0.01);
+    }
+}
+
 TEST(Reference, OpenPlaneUnderAConstantSky) {
     Scene scene;
     addFloor(scene, 5, addMaterial(scene, lambert(0.5f)));

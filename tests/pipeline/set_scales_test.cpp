@@ -56,6 +56,21 @@ TEST(SetScales, TimesTheScaleEverythingIsAsItWas) {
     EXPECT_EQ(scales.of_group[1], level.materials[level.meshes[0].triangle_materials[0]].emission_cd_m2);
 }
 
+// Divided by such a lamp's scale the surface would be infinite.
+TEST(SetScales, ASurfaceBesideALampThatIsAllButOffKeepsItsLight) {
+    Scene scene = panels(40, 5);
+    const auto bulb = std::ranges::find(scene.lights, "bulb", &PunctualLight::node);
+    ASSERT_NE(bulb, scene.lights.end());
+    const Scene level = scene;
+    bulb->intensity = glm::vec3(1e-37f);
+    const uint32_t group = groupOf(bulb->light_set);
+    const SetScales scales = divideByScales(scene);
+    for (size_t m = 0; m < level.meshes.size(); ++m)
+        if (groupOf(level.meshes[m].light_set) == group)
+            expectNear(scene.materials[scene.meshes[m].triangle_materials[0]].emission_cd_m2 * scales.of_group[group],
+                       level.materials[level.meshes[m].triangle_materials[0]].emission_cd_m2);
+}
+
 // A lamp that is all but off beside a bright sky: variances are squares of squares of light, and must stay finite.
 TEST(SetScales, NothingThatIsAlwaysOnIsLarge) {
     for (const auto& [sun, sky] : {std::pair(1e-17, 1e4), std::pair(1e-36, 1e4), std::pair(1e5, 1e-6)}) {

@@ -50,6 +50,8 @@ TEST(DoorWeight, SlidingIsTravelOverWidth) {
     EXPECT_FLOAT_EQ(slidingDoorWeight(0.2f, 0.8f), 0.25f);
     EXPECT_EQ(slidingDoorWeight(1, 0.8f), 1);
     EXPECT_EQ(slidingDoorWeight(0.1f, 0), 1);
+    EXPECT_TRUE(std::isnan(slidingDoorWeight(NAN, 0.8f)));
+    EXPECT_TRUE(std::isnan(slidingDoorWeight(0.2f, NAN)));
 }
 
 // Weights are what setDoor accepts, and never step back, in 256 steps of either.

@@ -31,11 +31,11 @@ std::string radianceRuns(uint8_t width, uint32_t height) {
     return file;
 }
 
-// `window_x`, `window_y`: where the data window begins.
+// `window_x`, `window_y`: where the data window begins. `display`: where the picture lies, if not there.
 void writeOpenExr(const std::filesystem::path& path, int width, int height, const std::vector<glm::vec4>& rgba,
-                  int window_x = 0, int window_y = 0) {
+                  int window_x = 0, int window_y = 0, std::optional<Imath::Box2i> display = {}) {
     const Imath::Box2i window({window_x, window_y}, {window_x + width - 1, window_y + height - 1});
-    Imf::Header header(window, window);
+    Imf::Header header(display.value_or(window), window);
     Imf::FrameBuffer frame;
     for (int c = 0; const char* name : {"R", "G", "B"}) {
         header.channels().insert(name, Imf::Channel(Imf::FLOAT));
@@ -81,6 +81,28 @@ TEST(SceneSkyImage, OpenExrWithAWindowOfItsOwn) {
         for (size_t i = 0; i < 12; ++i)  // what is negative counts as black
             EXPECT_EQ(glm::vec3(image->texels[i]), glm::max(glm::vec3(texels[i]), glm::vec3(0)));
     }
+}
+
+// Cropped to its content, or with more than is shown: texels lie where the display has them.
+TEST(SceneSkyImage, OpenExrWithAnotherDisplayWindow) {
+    const TemporaryFolder folder;
+    std::vector<glm::vec4> texels;
+    for (int i = 0; i < 12; ++i) texels.emplace_back(1 + i, 0, 0, 0);
+    const auto redOf = [&](const Imath::Box2i& display) {
+        writeOpenExr(folder.path / "sky.exr", 4, 3, texels, 10, 20, display);
+        const auto image = readSkyImage(folder.path / "sky.exr");
+        EXPECT_TRUE(image.has_value()) << image.error().message;
+        std::vector<float> red;
+        if (image)
+            for (const glm::vec4& t : image->texels) red.push_back(t.x);
+        return red;
+    };
+    EXPECT_EQ(redOf({{9, 20}, {14, 23}}),  // one more column to the left and to the right, one more row below
+              (std::vector<float>{0, 1, 2, 3, 4, 0, 0, 5, 6, 7, 8, 0, 0, 9, 10, 11, 12, 0, 0, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(redOf({{11, 21}, {12, 22}}), (std::vector<float>{6, 7, 10, 11}));
+    EXPECT_EQ(redOf({{13, 22}, {14, 23}}), (std::vector<float>{12, 0, 0, 0}));
+    EXPECT_EQ(redOf({{30, 20}, {31, 20}}), (std::vector<float>{0, 0}));
+    EXPECT_EQ(redOf({{10, 30}, {10, 31}}), (std::vector<float>{0, 0}));
 }
 
 TEST(SceneSkyImage, InALevel) {

@@ -161,7 +161,8 @@ dimmer_result dimmer_pack_get_model_mesh(const dimmer_pack* pack, uint32_t index
 typedef struct dimmer_lights dimmer_lights;
 
 /* On the CPU, with `thread_count` threads (1 to 1024, the caller's included) and room for `moving_probes_max` probes of
- * models that move: 28 bytes each, and each model takes a multiple of 8. Keeps what it needs of the pack alive. */
+ * models that move: some 60 bytes each, 32 of which are touched at once, and each model takes a multiple of 8. Keeps
+ * what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
 /* Null is allowed. Waits for what dimmer_lights_submit() sent, and for nothing else: of the caller's submissions those
