@@ -1,6 +1,6 @@
 // From how far a door stands open to the weight that LightState::setDoor takes: the share of the opening that light can
-// pass. Defaults for the two common kinds; a game may use any curve of its own. Where an argument is NaN so is the weight,
-// which setDoor refuses. Thread-safe. Not inline: under a game's -ffast-math, NaN would open doors.
+// pass. Defaults for the two common kinds; a game may use any curve of its own. Where an argument is NaN so is the
+// weight, which setDoor refuses. Thread-safe. Not inline: under a game's -ffast-math, NaN would open doors.
 #pragma once
 
 namespace dimmer {
