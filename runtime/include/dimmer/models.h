@@ -20,8 +20,8 @@ struct ModelGrid {
 };
 
 // For a model that fills this box: at least 2 probes an axis, so that light has a gradient, and no further apart than
-// `spacing_m`, unless that takes more than `probes_max`, or 64 along an axis: then the spacing grows. Source: section 2.4 of UBERBAKE for
-// the spacing of 1.5 m.
+// `spacing_m`, unless that takes more than `probes_max`, or 64 along an axis: then the spacing grows. Source:
+// section 2.4 of UBERBAKE for the spacing of 1.5 m.
 ModelGrid modelGrid(std::array<float, 3> min_m, std::array<float, 3> max_m, float spacing_m = 1.5f,
                     uint32_t probes_max = 64);
 
