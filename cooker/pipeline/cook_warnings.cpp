@@ -26,7 +26,7 @@ std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
 }
 
 std::optional<std::string> farFromOrigin(const RayScene& rays) {
-    // A step of floats is 0.24 mm from here on; points of surfaces lie 0.5 mm off them, the reference's 0.2 mm.
+    // A step of floats is 0.24 mm from here on, and points of surfaces lie four of them off (liftOff()), not 0.5 mm.
     constexpr float far_m = 2048;
     const glm::vec3 farthest = glm::max(glm::abs(rays.boundsMin()), glm::abs(rays.boundsMax()));
     const float most_m = std::max({farthest.x, farthest.y, farthest.z});

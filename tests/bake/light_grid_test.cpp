@@ -80,7 +80,7 @@ TEST(LightGrid, WhatIsSeenItselfOrFarOutsideIsAskedForEverywhere) {
     EXPECT_EQ(askedAt(LightGrid(rays), {0, 0, 0}), (std::set<uint32_t>{}));
 }
 
-// Whatever stops light is the shadow rays' to say: of the few rays that find the window hardly any would pass its pane.
+// How much stops light is the shadow rays' to say: of 4,096 rays one in 10,000 would pass both panes.
 TEST(LightGrid, WhatHidesAllButALittleHidesNothing) {
     Scene scene;
     addFloor(scene, 12, addMaterial(scene, lambert(0.5f)));
