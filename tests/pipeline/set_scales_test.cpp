@@ -59,6 +59,7 @@ TEST(SetScales, TimesTheScaleEverythingIsAsItWas) {
 // Divided by such a lamp's scale the surface would be infinite.
 TEST(SetScales, ASurfaceBesideALampThatIsAllButOffKeepsItsLight) {
     Scene scene = panels(40, 5);
+    for (Material& m : scene.materials) m.emission_cd_m2 *= 1e4f;
     const auto bulb = std::ranges::find(scene.lights, "bulb", &PunctualLight::node);
     ASSERT_NE(bulb, scene.lights.end());
     const Scene level = scene;
