@@ -149,18 +149,18 @@ class LightmapFilter {
     Sparse<float> means_;  // of the luminance around each entry of light_
 };
 
-// Per block of receivers, which ascend along rows of pages: the last one with receivers at most `reach` rows further.
-std::vector<uint32_t> lastReaders(const Texels& texels, int reach) {
-    const auto rowOf = [](uint32_t address) {
-        return uint64_t{TexelAddress::page(address)} << 32 | TexelAddress::y(address);
-    };
-    std::vector<uint32_t> last(blockCount(texels.size()));
-    for (size_t b = 0; b < last.size(); ++b) {
-        const size_t end = std::min((b + 1) * rows_per_block, texels.size());
-        const auto further = std::ranges::upper_bound(
-            texels.address, rowOf(texels.address[end - 1]) + static_cast<uint64_t>(reach), {}, rowOf);
-        last[b] = static_cast<uint32_t>((further - texels.address.begin() - 1) / rows_per_block);
-    }
+// Per block of receivers: the last one with receivers at most `steps` times `step` texels away.
+std::vector<uint32_t> lastReaders(const Surface& surface, size_t receivers, int steps, int step) {
+    std::vector<uint32_t> last(blockCount(receivers));
+    forEachBlock(receivers, [&](size_t begin, size_t end) {
+        uint32_t furthest = 0;
+        for (size_t i = begin; i < end; ++i)
+            for (int dy = -steps; dy <= steps; ++dy)
+                for (int dx = -steps; dx <= steps; ++dx)
+                    if (const uint32_t other = surface.neighbour(i, dx * step, dy * step); other != no_index)
+                        furthest = std::max(furthest, other);
+        last[begin / rows_per_block] = static_cast<uint32_t>(furthest / rows_per_block);
+    });
     return last;
 }
 
@@ -170,20 +170,22 @@ Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse
                               Progress& progress) {
     progress.stage("denoise", texels.size() * (passes + 1));
     const Surface surface(unwrap, texels);
-    const auto run = [&](int reach, auto&& filter_row) {
-        light.rewrite(lastReaders(texels, reach), [&](size_t begin, size_t end, auto row_of) {
+    const auto run = [&](int steps, int step, auto&& filter_row) {
+        light.rewrite(lastReaders(surface, texels.size(), steps, step), [&](size_t begin, size_t end, auto row_of) {
             for (size_t i = begin; i < end; ++i) filter_row(i, row_of(i));
             progress.advance(end - begin);
         });
     };
-    run(mean_reach, [&](size_t i, std::span<ReceiverLight> row) {
+    run(mean_reach, 1, [&](size_t i, std::span<ReceiverLight> row) {
         std::vector<float> counts;
         surface.addAround(light, i, counts, [&](size_t k, const ReceiverLight& o) { row[k].variance += o.variance; });
         for (size_t k = 0; k < row.size(); ++k) row[k].variance /= counts[k];
     });
     for (int pass = 0; pass < passes; ++pass)
-        run(kernel_reach << pass, [filter = LightmapFilter(surface, light, 1 << pass)](
-                                      size_t i, std::span<ReceiverLight> row) { filter.filter(i, row); });
+        run(kernel_reach, 1 << pass,
+            [filter = LightmapFilter(surface, light, 1 << pass)](size_t i, std::span<ReceiverLight> row) {
+                filter.filter(i, row);
+            });
     return light;
 }
 

@@ -1,6 +1,7 @@
 #include <bake/direct.h>
 
 #include <bake/door_rays.h>
+#include <bake/near_lamps.h>
 #include <bake/punctual.h>
 #include <bake/sampling.h>
 
@@ -41,21 +42,26 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
                    });
     };
     const std::vector<PunctualLight>& lights = rays.scene().lights;
+    const auto scaleOf = [&](const PunctualLight& light) {
+        return light.type == LightType::Directional ? 1.0f : nearLampScale(gatherer, from, light.position_m);
+    };
     if (from.wide) {
         for (const SamplePoint& p : from.points)
-            grid.forEach(p.position_m, [&](uint32_t l) { addLight(lights[l], p, 1 / static_cast<float>(points)); });
+            grid.forEach(p.position_m,
+                         [&](uint32_t l) { addLight(lights[l], p, scaleOf(lights[l]) / static_cast<float>(points)); });
         return traced;
     }
     const glm::vec3 place = from.points[0].position_m;
     grid.forEach(place, [&](uint32_t l) {
         const PunctualLight& light = lights[l];
+        const float scale = scaleOf(light);
         const uint32_t first = hash(grid.identity(l), from.id) % points;
         // Shadows that are stored are seen, and have edges at any distance.
         const bool all = light.type == LightType::Directional || light.bake == BakeMode::Full ||
                          glm::distance(light.position_m, place) < near_m;
-        const uint32_t used = all ? std::min(points, points_max) : 1;
+        const uint32_t used = scale != 1 ? points : all ? std::min(points, points_max) : 1;
         for (uint32_t i = 0; i < used; ++i)
-            addLight(light, from.points[(first + i) % points], 1 / static_cast<float>(used));
+            addLight(light, from.points[(first + i) % points], scale / static_cast<float>(used));
     });
     return traced;
 }

@@ -145,6 +145,7 @@ struct GatherFrom {
     uint32_t condition = no_condition;  // under which the receiver is there: a leaf's
     uint32_t ignored = no_model;        // a model that its rays pass through
     bool wide = false;                  // points may lie metres apart: not all get the same lights
+    uint32_t texel = no_index;          // that the points are all of
 };
 
 // What the rays of a gather found, for going there again.
@@ -211,7 +212,8 @@ class Gatherer {
                 static_cast<uint32_t>(receiver),
                 conditionOf(receiver),
                 no_model,
-                texels_.area_m2[receiver] > wide_texel_m2};
+                texels_.area_m2[receiver] > wide_texel_m2,
+                static_cast<uint32_t>(receiver)};
     }
     // no_condition but for the texels of doors' leaves.
     uint32_t conditionOf(size_t receiver) const {

@@ -8,9 +8,12 @@
 namespace dimmer::cook {
 namespace {
 
-// Of a difference, the bits that are written as they are: about the mean's.
-uint32_t plainBits(uint32_t receivers, size_t links) {
-    return static_cast<uint32_t>(std::bit_width(receivers / links | 1) - 1);
+// Of differences, how many bits to write as they are. One more adds a bit to each and spares two of those above that
+// width: half of them are shorter, half of them longer. Reorders them.
+uint32_t plainBits(std::span<uint32_t> differences) {
+    const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+    std::ranges::nth_element(differences, middle);
+    return static_cast<uint32_t>(std::bit_width(*middle | 1) - 1);
 }
 
 // The first bit written is the lowest of the first byte.
@@ -27,16 +30,16 @@ class BitWriter {
         waiting_ |= uint64_t{value} << held_;
         for (held_ += count; held_ >= 8; held_ -= 8, waiting_ >>= 8) bytes_.push_back(static_cast<uint8_t>(waiting_));
     }
-    // So many ones and a zero, then the lowest bits of `low`.
-    void putOnes(uint32_t ones, uint32_t low, uint32_t low_bits) {
-        for (; ones >= 31; ones -= 31) put((1u << 31) - 1, 31);
-        put((1u << ones) - 1, ones + 1);
-        put(low & static_cast<uint32_t>((uint64_t{1} << low_bits) - 1), low_bits);
-    }
-    // Of 1 and above (Elias 1975).
+    // Of 1 to 2^31: its length, then what is behind its first bit (Elias 1975).
     void putNumber(uint32_t n) {
         const auto bits = static_cast<uint32_t>(std::bit_width(n) - 1);
-        putOnes(bits, n, bits);
+        put((1u << bits) - 1, bits + 1);
+        put(n & ((1u << bits) - 1), bits);
+    }
+    // Its lowest bits as they are, the others as a number.
+    void putDifference(uint32_t difference, uint32_t plain_bits) {
+        putNumber(1 + (difference >> plain_bits));
+        put(difference & ((1u << plain_bits) - 1), plain_bits);
     }
 
    private:
@@ -49,34 +52,21 @@ class BitReader {
    public:
     explicit BitReader(std::span<const uint8_t> bytes) : at_(bytes.data()), end_(at_ + bytes.size()) {}
 
-    // How many ones stand before the next zero, which is taken too.
-    uint32_t ones() {
-        uint32_t count = 0;
-        for (fill(); held_ > 0; fill()) {
-            const auto run = static_cast<uint32_t>(std::countr_one(bits_));
-            count += std::min(run, held_);
-            if (run < held_) {
-                skip(run + 1);
-                break;
-            }
-            skip(held_);
-        }
-        return count;
-    }
     uint32_t get(uint32_t count) {
         fill();
         const auto value = static_cast<uint32_t>(bits_ & ((uint64_t{1} << count) - 1));
-        skip(std::min(count, held_));
+        skip(count);
         return value;
     }
     uint32_t number() {
-        const uint32_t bits = ones();
+        fill();
+        const auto bits = static_cast<uint32_t>(std::countr_one(bits_));
+        skip(bits + 1);
         return 1u << bits | get(bits);
     }
-    // What putOnes() wrote, as one number.
-    uint32_t difference(uint32_t low_bits) {
-        const uint32_t high = ones();
-        return high << low_bits | get(low_bits);
+    uint32_t difference(uint32_t plain_bits) {
+        const uint32_t above = number() - 1;
+        return above << plain_bits | get(plain_bits);
     }
 
    private:
@@ -93,7 +83,7 @@ class BitReader {
         for (; held_ <= 56 && at_ != end_; held_ += 8) bits_ |= uint64_t{*at_++} << held_;
     }
     void skip(uint32_t count) {
-        bits_ = count < 64 ? bits_ >> count : 0;
+        bits_ >>= count;
         held_ -= count;
     }
 
@@ -109,6 +99,7 @@ void Links::Builder::put(size_t receiver, std::vector<Link>& links) {
         return (uint64_t{a.path} << 32 | a.receiver) < (uint64_t{b.path} << 32 | b.receiver);
     });
     std::vector<uint8_t> bytes;
+    std::vector<uint32_t> differences;
     {
         BitWriter writer(bytes);
         uint32_t path = 0;  // one more than the last
@@ -118,12 +109,13 @@ void Links::Builder::put(size_t receiver, std::vector<Link>& links) {
             writer.putNumber(1 + count);
             writer.putNumber(1 + links[begin].path - path);
             path = 1 + links[begin].path;
-            const uint32_t low_bits = plainBits(receivers_, count);
-            uint32_t last = 0;
-            for (; begin < end; last = links[begin++].receiver) {
-                const uint32_t difference = links[begin].receiver - last;
-                writer.putOnes(difference >> low_bits, difference, low_bits);
-            }
+            differences.clear();
+            for (size_t i = begin; i < end; ++i)
+                differences.push_back(links[i].receiver - (i == begin ? 0 : links[i - 1].receiver));
+            const uint32_t plain_bits = plainBits(differences);
+            writer.putNumber(1 + plain_bits);
+            for (uint32_t last = 0; begin < end; last = links[begin++].receiver)
+                writer.putDifference(links[begin].receiver - last, plain_bits);
         }
         if (!links.empty()) writer.putNumber(1);
     }
@@ -138,9 +130,9 @@ void Links::get(size_t receiver, std::vector<Link>& links) const {
     uint32_t path = 0;
     while (const uint32_t count = reader.number() - 1) {
         path += reader.number() - 1;
-        const uint32_t low_bits = plainBits(receivers_, count);
+        const uint32_t plain_bits = reader.number() - 1;
         uint32_t at = 0;
-        for (uint32_t i = 0; i < count; ++i) links.push_back({at += reader.difference(low_bits), path});
+        for (uint32_t i = 0; i < count; ++i) links.push_back({at += reader.difference(plain_bits), path});
         ++path;
     }
 }

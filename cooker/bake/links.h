@@ -14,9 +14,10 @@ struct Link {
     auto operator<=>(const Link&) const = default;
 };
 
-// The links of every receiver, at final some 180 of each: by path, in order of the receivers that they lead
-// to, as differences in Rice codes (Golomb 1966; Rice and Plaunt 1971). Some 15 bits a link, where the number of one of
-// a million receivers takes 20 and that of a path as many again. Thread-safe to read.
+// The links of every receiver, at final some 180 of each: by path, in order of the receivers that they lead to, as
+// differences. Of receivers below 2^31. Receivers that lie near each other have numbers near each other (texels.h): at
+// final some 10 bits a link, where the number of one of a million receivers takes 20 and that of a path as many
+// again. Thread-safe to read.
 class Links {
    public:
     Links() = default;
@@ -27,23 +28,21 @@ class Links {
     // Rows of one block (sparse_light.h) must come in order; blocks may be filled in parallel.
     class Builder {
        public:
-        explicit Builder(size_t receivers) : bytes_(receivers), receivers_(static_cast<uint32_t>(receivers)) {}
+        explicit Builder(size_t receivers) : bytes_(receivers) {}
         // Sorts `links`.
         void put(size_t receiver, std::vector<Link>& links);
         // No more comes of a receiver's block.
         void close(size_t receiver) { bytes_.close(receiver); }
-        Links finish() { return {bytes_.finish(), receivers_}; }
+        Links finish() { return Links(bytes_.finish()); }
 
        private:
         Sparse<uint8_t>::Builder bytes_;
-        uint32_t receivers_;
     };
 
    private:
-    Links(Sparse<uint8_t> bytes, uint32_t receivers) : bytes_(std::move(bytes)), receivers_(receivers) {}
+    explicit Links(Sparse<uint8_t> bytes) : bytes_(std::move(bytes)) {}
 
     Sparse<uint8_t> bytes_;
-    uint32_t receivers_ = 0;
 };
 
 }  // namespace dimmer::cook

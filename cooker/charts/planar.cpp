@@ -27,6 +27,12 @@ constexpr float filter_reach_texels = 2;
 // A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
 constexpr float waste_max = 1.3f;
 constexpr float waste_free_texels = 16;
+// Within one plane, as planeKey() tells them apart, and the normals of its faces: by how much heights over it differ.
+constexpr float height_slack_m = 0.02f, height_slack_per_m = 1.0f / 256;
+// Rays are as exact as coordinates: 8e-6 m at 100 m.
+constexpr float ray_slack_m = 1e-4f, ray_slack_per_m = 1e-6f;
+// With more than so many things around a face each line between points is asked for.
+constexpr size_t shadows_max = 512;
 // A surface this high over another one hides it: the points that texels are lit at lie lower (texels.cpp).
 constexpr float hiding_m = 5e-4f;
 
@@ -41,6 +47,9 @@ struct Rect {
         add(r.max);
     }
     float area() const { return (max.x - min.x) * (max.y - min.y); }
+    bool touches(const Rect& r) const {
+        return glm::all(glm::lessThanEqual(min, r.max)) && glm::all(glm::lessThanEqual(r.min, max));
+    }
 };
 
 struct Axes {
@@ -106,10 +115,10 @@ class PlaneGrouper {
         findContacts();
     }
 
-    std::vector<PlanarChart> charts(const std::function<bool(glm::vec3, glm::vec3)>& blocked) {
+    std::vector<PlanarChart> charts(const Standing& standing) {
         Apart apart = findStacks();
         merge(apart);
-        if (blocked && findWalls(blocked, apart)) merge(apart);
+        if (standing.blocked && findWalls(standing, apart)) merge(apart);
         std::map<uint32_t, PlanarChart> by_root;
         for (uint32_t i = 0; i < ids_.size(); ++i) {
             const uint32_t root = find(i);
@@ -285,21 +294,75 @@ class PlaneGrouper {
     }
 
     // Adds the pairs of faces of one chart that come within the filter's reach of one another with a wall between.
-    bool findWalls(const std::function<bool(glm::vec3, glm::vec3)>& blocked, Apart& apart) {
+    bool findWalls(const Standing& standing, Apart& apart) {
         const size_t before = apart.size();
         const float reach = filter_reach_texels / density_;
         std::vector<uint32_t> root(ids_.size());
         for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = find(i);
         std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
         tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
+            const Walls walls{standing.blocked, standing.triangles ? shadowsNear(a, reach, standing) : std::nullopt};
+            if (walls.shadows && walls.shadows->empty()) return;
             for (const uint32_t b : boxes_.touching(boxOf(a, reach + touching_m)))
-                if (a < b && root[a] == root[b] && near(a, b, reach) &&
-                    (wallBetween(a, b, reach, blocked) || wallBetween(b, a, reach, blocked)))
+                if (a < b && root[a] == root[b] && near(a, b, reach) && walls.mayPart(rectOf(a), rectOf(b)) &&
+                    (wallBetween(a, b, reach, walls) || wallBetween(b, a, reach, walls)))
                     beyond_walls[a].push_back(b);
         });
         for (uint32_t a = 0; a < ids_.size(); ++a)
             for (const uint32_t b : beyond_walls[a]) keepApart(apart, a, b);
         return apart.size() > before;
+    }
+
+    // What may part faces from one: of all that stands as high as a wall, where it is in the plane; nothing: anywhere.
+    struct Walls {
+        const std::function<bool(glm::vec3, glm::vec3)>& blocked;
+        std::optional<std::vector<Rect>> shadows;
+
+        bool mayPart(Rect a, const Rect& b) const {
+            a.add(b);
+            return !shadows || std::ranges::any_of(*shadows, [&](const Rect& shadow) { return shadow.touches(a); });
+        }
+    };
+
+    // Within reach of a face; nothing where there are too many.
+    std::optional<std::vector<Rect>> shadowsNear(uint32_t face, float reach, const Standing& standing) const {
+        const PlanarFace& f = all_[ids_[face]];
+        Rect rect = rectOf(face);
+        const float slack_m = height_slack_m + height_slack_per_m * (reach + glm::length(rect.max - rect.min));
+        rect.min -= reach, rect.max += reach;
+        const glm::vec3 normal = glm::cross(axes_.u, axes_.v);
+        const float plane_m = glm::dot(normal, f.corners_m[0]);
+        const float low = plane_m + wall_probe_high_m - slack_m, high = plane_m + wall_probe_high_m + slack_m;
+        std::vector<glm::vec3> corners;
+        for (const float height : {low, high})
+            for (const float u : {rect.min.x, rect.max.x})
+                for (const float v : {rect.min.y, rect.max.y})
+                    corners.push_back(axes_.u * u + axes_.v * v + normal * height);
+        std::vector<Rect> shadows;
+        for (const auto& triangle : standing.triangles(BoxTree::boxOf(corners))) {
+            Rect shadow = shadowBetween(triangle, normal, low, high);
+            if (!(shadow.min.x <= shadow.max.x)) continue;
+            const glm::vec2 largest = glm::max(glm::abs(shadow.min), glm::abs(shadow.max));
+            const float ray_slack = ray_slack_m + ray_slack_per_m * std::max(largest.x, largest.y);
+            shadow.min -= ray_slack, shadow.max += ray_slack;
+            if (shadow.touches(rect)) shadows.push_back(shadow);
+            if (shadows.size() > shadows_max) return std::nullopt;
+        }
+        return shadows;
+    }
+
+    // Where in the plane a triangle is between two heights.
+    Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, glm::vec3 normal, float low, float high) const {
+        Rect shadow;
+        for (size_t i = 0; i < 3; ++i) {
+            const glm::vec3 a = triangle[i], b = triangle[(i + 1) % 3];
+            const float height_a = glm::dot(normal, a), height_b = glm::dot(normal, b);
+            if (height_a >= low && height_a <= high) shadow.add(axes_.on(a));
+            for (const float height : {low, high})
+                if ((height_a < height) != (height_b < height))
+                    shadow.add(axes_.on(glm::mix(a, b, (height - height_a) / (height_b - height_a))));
+        }
+        return shadow;
     }
 
     // In the plane, and so much more to each side.
@@ -319,13 +382,12 @@ class PlaneGrouper {
         return glm::all(glm::lessThan(ra.min, rb.max + reach)) && glm::all(glm::lessThan(rb.min, ra.max + reach));
     }
 
-    bool wallBetween(uint32_t a, uint32_t b, float reach,
-                     const std::function<bool(glm::vec3, glm::vec3)>& blocked) const {
+    bool wallBetween(uint32_t a, uint32_t b, float reach, const Walls& walls) const {
         const PlanarFace& fa = all_[ids_[a]];
         const PlanarFace& fb = all_[ids_[b]];
         auto wallAt = [&](glm::vec3 p, glm::vec3 q, float height_m) {
             const glm::vec3 lift = fa.normal * height_m;
-            return blocked(p + lift, q + lift) || blocked(q + lift, p + lift);
+            return walls.blocked(p + lift, q + lift) || walls.blocked(q + lift, p + lift);
         };
         const glm::vec3 middle = (fa.corners_m[0] + fa.corners_m[1] + fa.corners_m[2]) / 3.0f;
         for (size_t e = 0; e < 3; ++e)
@@ -338,6 +400,8 @@ class PlaneGrouper {
                 const glm::vec3 middle_b = (fb.corners_m[0] + fb.corners_m[1] + fb.corners_m[2]) / 3.0f;
                 p += 0.01f * (middle - p);
                 q += 0.01f * (middle_b - q);
+                const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
+                if (!walls.mayPart({on_p, on_p}, {on_q, on_q})) continue;
                 if (wallAt(p, q, wall_probe_low_m) && wallAt(p, q, wall_probe_high_m)) return true;
             }
         return false;
@@ -370,12 +434,12 @@ class PlaneGrouper {
 }  // namespace
 
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked, Along along) {
+                                      const Standing& standing, Along along) {
     std::map<PlaneKey, std::vector<uint32_t>> planes;
     for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
     std::vector<PlanarChart> charts;
     const auto chart = [&](PlaneGrouper& plane, bool turned) {
-        for (PlanarChart& made : plane.charts(blocked)) {
+        for (PlanarChart& made : plane.charts(standing)) {
             made.turned = turned;
             charts.push_back(std::move(made));
         }

@@ -1,10 +1,13 @@
 // Groups faces into planar charts.
 #pragma once
 
+#include <charts/box_tree.h>
 #include <charts/unwrap.h>
 
+#include <array>
 #include <functional>
 #include <span>
+#include <vector>
 
 namespace dimmer::cook {
 
@@ -37,11 +40,18 @@ inline uint32_t chartGroup(const SceneMesh& mesh) {
     return mesh.door ? 2 * *mesh.door + mesh.is_open_leaf + 1 : 0;
 }
 
-// `blocked(a, b)`: something opaque stands on the straight line between two points; asked on all threads. Empty:
-// nothing does. Deterministic. Cost: with the number of faces times those within two texels of one, for which walls are
-// looked for between them; without `blocked`, near O(n log n) where the boxes of faces in one plane overlap few others.
+// What stands on a level's planes; asked on all threads.
+struct Standing {
+    // Something opaque is on the straight line between two points. Empty: nothing is.
+    std::function<bool(glm::vec3, glm::vec3)> blocked;
+    // Triangles, among them all opaque ones that touch a box: where there are none, `blocked` is not asked. Empty:
+    // there may be some anywhere.
+    std::function<std::vector<std::array<glm::vec3, 3>>(const BoxTree::Box&)> triangles;
+};
+
+// Deterministic. Cost: near O(n log n) where the boxes of faces in one plane overlap few others; where something stands
+// on them, times those within two texels of it.
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const std::function<bool(glm::vec3, glm::vec3)>& blocked,
-                                      Along axes = Along::Edges);
+                                      const Standing& standing = {}, Along axes = Along::Edges);
 
 }  // namespace dimmer::cook

@@ -8,7 +8,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -21,6 +23,8 @@ constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
 // A texel whose first points all lie inside geometry is given up.
 constexpr uint32_t drops_max = 24;
+// Receivers within such a cell stand in the order of their page; a level has at most so many along an axis.
+constexpr float cell_m = 1, cells_max = (1 << 21) - 1;
 
 struct Covered {
     uint64_t texel;  // index over all pages
@@ -206,6 +210,34 @@ class TexelSampler {
     std::vector<glm::vec2> tries_;
 };
 
+// The bits of a coordinate, two zeros after each.
+uint64_t spread(uint32_t bits) {
+    uint64_t b = bits & 0x1fffff;
+    b = (b | b << 32) & 0x1f00000000ffff;
+    b = (b | b << 16) & 0x1f0000ff0000ff;
+    b = (b | b << 8) & 0x100f00f00f00f00f;
+    b = (b | b << 4) & 0x10c30c30c30c30c3;
+    return (b | b << 2) & 0x1249249249249249;
+}
+
+// The texels that have points, along a curve through space (Morton 1966). Pages put a room's charts far from each
+// other; this way what rays of neighbours read is near by in memory, and so are its numbers.
+std::vector<uint32_t> bySpace(std::span<const TexelSampler::Result> texels) {
+    glm::vec3 low(std::numeric_limits<float>::max());
+    for (const auto& t : texels)
+        if (!t.points.empty()) low = glm::min(low, t.points[0].position_m);
+    std::vector<std::pair<uint64_t, uint32_t>> order;
+    for (uint32_t i = 0; i < texels.size(); ++i) {
+        if (texels[i].points.empty()) continue;
+        const glm::uvec3 cell(glm::min((texels[i].points[0].position_m - low) / cell_m, cells_max));
+        order.emplace_back(spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, i);
+    }
+    std::ranges::sort(order);
+    std::vector<uint32_t> sorted;
+    for (const auto& [place, i] : order) sorted.push_back(i);
+    return sorted;
+}
+
 }  // namespace
 
 Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max) {
@@ -222,15 +254,15 @@ Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples
         results[i] = sampler.sample({cover.data() + starts[i], starts[i + 1] - starts[i]});
     });
 
+    const std::vector<uint32_t> order = bySpace(results);
     Texels out;
     const size_t page_texels = size_t{unwrap.page_count} * unwrap.page_width * unwrap.page_height;
     out.receiver_at.assign(page_texels, no_index);
     std::vector<uint8_t> covered(page_texels);
+    for (size_t i = 0; i < candidates; ++i) covered[cover[starts[i]].texel] = 1;
     out.first_sample.push_back(0);
-    for (size_t i = 0; i < candidates; ++i) {
+    for (const uint32_t i : order) {
         const uint64_t texel = cover[starts[i]].texel;
-        covered[texel] = 1;
-        if (results[i].points.empty()) continue;
         out.receiver_at[texel] = static_cast<uint32_t>(out.address.size());
         out.address.push_back(
             TexelAddress::pack(static_cast<uint32_t>(texel / unwrap.page_width / unwrap.page_height),

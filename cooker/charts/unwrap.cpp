@@ -213,6 +213,12 @@ bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& o
     return true;
 }
 
+BoxTree boxesOf(const RayScene& rays) {
+    std::vector<BoxTree::Box> boxes;
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t) boxes.push_back(BoxTree::boxOf(corners(rays, {t, false})));
+    return BoxTree(std::move(boxes));
+}
+
 std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& options, Unwrap& out) {
     const Scene& scene = rays.scene();
     for (uint32_t m = 0; m < scene.meshes.size(); ++m)
@@ -242,8 +248,15 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
              fileCharts(rays, out, ids, scene.meshes[m].texels_per_metre.value_or(options.texels_per_metre),
                         options.page_size))
             charts.push_back(std::move(chart));
-    auto blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
-    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, blocked)) {
+    const BoxTree triangles = boxesOf(rays);
+    Standing standing;
+    standing.blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
+    standing.triangles = [&](const BoxTree::Box& box) {
+        std::vector<std::array<glm::vec3, 3>> found;
+        for (const uint32_t t : triangles.touching(box)) found.push_back(corners(rays, {t, false}));
+        return found;
+    };
+    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, standing)) {
         warnOfCoarseness(rays, out, planar_ids[c.faces[0]], std::max(c.size_m.x, c.size_m.y) * c.texels_per_metre,
                          options.page_size);
         charts.push_back(planarChart(rays, out.faces, planar_ids, std::move(c), options.page_size));

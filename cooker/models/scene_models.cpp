@@ -34,7 +34,7 @@ bool fallsApart(const Scene& scene, const SceneMesh& mesh) {
         if (scene.materials[mesh.triangle_materials[t]].emission_cd_m2 != glm::vec3(0)) return false;
         faces.push_back(face);
     }
-    const size_t charts = planarCharts(faces, UINT16_MAX, {}).size();
+    const size_t charts = planarCharts(faces, UINT16_MAX).size();
     return charts > few_charts && area_m2 < small_chart_m2 * static_cast<float>(charts);
 }
 

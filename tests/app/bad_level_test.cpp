@@ -193,9 +193,9 @@ TEST_F(Cooks, WarnsOfWhatIsSuspicious) {
          [](LevelFile& l) {
              l.addNode({{"name", "leaf"},
                         {"mesh", l.addSquareMesh(0)},
-                        {"translation", {0, 0.5f, 0}},
-                        {"rotation", {1, 0, 0, 0}},  // facing the floor, whose light it sends back
-                        {"scale", {0.2f, 0.2f, 0.2f}},
+                        {"translation", {0, 0.5f, 0.9f}},
+                        {"rotation", {1, 0, 0, 0}},  // upright, facing the lamp, whose light it sends to the floor
+                        {"scale", {0.4f, 0.4f, 0.4f}},
                         {"extras", {{"dimmer_door", "small"}}}});
              l.document["scenes"][0]["extras"]["dimmer_settings"] = "records.threshold=1";
          },

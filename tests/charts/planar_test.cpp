@@ -2,8 +2,11 @@
 #include <charts/planar.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <atomic>
 #include <cmath>
 #include <span>
+#include <vector>
 
 namespace dimmer::cook::test {
 namespace {
@@ -23,7 +26,7 @@ std::vector<PlanarFace> tiles(uint32_t columns, uint32_t rows, float side_m, flo
 // Side by side, none before the other along the first axis: of 160,000 parts in one row there are 13 billion pairs.
 TEST(PlanarCharts, OfManyPartsCompareNeighboursAlone) {
     constexpr uint32_t count = 80'000;
-    size_t asked = 0;
+    std::atomic<size_t> asked = 0;  // on all threads
     const auto blocked = [&](glm::vec3, glm::vec3) {
         ++asked;
         return false;
@@ -32,7 +35,7 @@ TEST(PlanarCharts, OfManyPartsCompareNeighboursAlone) {
         asked = 0;
         const auto faces = along_x ? tiles(count, 1, 0.125f, 0.03125f) : tiles(1, count, 0.125f, 0.03125f);
         size_t found = 0;
-        for (const PlanarChart& chart : planarCharts(faces, 1u << 20, blocked)) found += chart.faces.size();
+        for (const PlanarChart& chart : planarCharts(faces, 1u << 20, {blocked, {}})) found += chart.faces.size();
         EXPECT_EQ(found, faces.size());
         EXPECT_LT(asked, size_t{100} * count);
     }
@@ -49,7 +52,7 @@ TEST(PlanarCharts, LieAlongTheEdgesOfWhatIsTurned) {
             faces.push_back(face);
         }
     }
-    const auto charts = planarCharts(faces, 1u << 20, {});
+    const auto charts = planarCharts(faces, 1u << 20);
     ASSERT_EQ(charts.size(), 3u);
     EXPECT_NEAR(charts[0].size_m.x * charts[0].size_m.y, 4, 1e-3);
     for (const PlanarChart& chart : std::span(charts).subspan(1)) {
@@ -59,10 +62,49 @@ TEST(PlanarCharts, LieAlongTheEdgesOfWhatIsTurned) {
     }
 }
 
+// A tessellated floor, a wall across its middle and a ceiling: what stands there says where to look, and the charts are
+// those of looking everywhere.
+TEST(PlanarCharts, LookForWallsWhereSomethingStands) {
+    constexpr float wall_x = 1.5f, wall_m = 2, ceiling_m = 2.5f, side_m = 3;
+    std::atomic<size_t> asked = 0;  // on all threads
+    bool has_wall = true;
+    const auto blocked = [&](glm::vec3 a, glm::vec3 b) {
+        ++asked;
+        return has_wall && (a.x < wall_x) != (b.x < wall_x) && a.y < wall_m && b.y < wall_m;
+    };
+    const auto standing = [&](const BoxTree::Box& box) {
+        std::vector<std::array<glm::vec3, 3>> triangles;
+        if (has_wall && box.min_m.x <= wall_x && box.max_m.x >= wall_x)
+            triangles = {{glm::vec3(wall_x, 0, 0), {wall_x, wall_m, 0}, {wall_x, wall_m, side_m}},
+                         {glm::vec3(wall_x, 0, 0), {wall_x, wall_m, side_m}, {wall_x, 0, side_m}}};
+        if (box.max_m.y >= ceiling_m)
+            triangles.push_back({glm::vec3(0, ceiling_m, 0), {2 * side_m, ceiling_m, 0}, {0, ceiling_m, 2 * side_m}});
+        return triangles;
+    };
+    const auto faces = tiles(30, 30, side_m / 30, 0);
+    const auto everywhere = planarCharts(faces, 1u << 20, {blocked, {}});
+    const size_t asked_everywhere = asked.exchange(0);
+    const auto charts = planarCharts(faces, 1u << 20, {blocked, standing});
+    ASSERT_GE(charts.size(), 2u);
+    ASSERT_EQ(charts.size(), everywhere.size());
+    for (size_t c = 0; c < charts.size(); ++c) {
+        EXPECT_EQ(charts[c].faces, everywhere[c].faces);
+        EXPECT_LE(charts[c].size_m.x, wall_x + 1e-3f);
+    }
+    EXPECT_GT(asked, 0u);
+    // Lines of at most two texels, half a metre, cross a wall in the middle of 3 m: every sixth, or of longer ones all.
+    EXPECT_LT(asked, asked_everywhere / 2);
+
+    has_wall = false;
+    asked = 0;
+    EXPECT_EQ(planarCharts(faces, 1u << 20, {blocked, standing}).size(), 1u);
+    EXPECT_EQ(asked, 0u);
+}
+
 // Walls stand between the tiles of one row: each tile is a chart of its own, however they touch.
 TEST(PlanarCharts, WallsPartTilesThatTouch) {
     const auto between = [](glm::vec3 a, glm::vec3 b) { return std::floor(a.x) != std::floor(b.x); };
-    const auto charts = planarCharts(tiles(50, 1, 1, 0), 1u << 20, between);
+    const auto charts = planarCharts(tiles(50, 1, 1, 0), 1u << 20, {between, {}});
     for (const PlanarChart& chart : charts) EXPECT_LT(chart.size_m.x, 1.001f);
     EXPECT_EQ(charts.size(), 50u);
 }

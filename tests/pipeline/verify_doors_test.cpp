@@ -8,7 +8,7 @@ namespace dimmer::cook::test {
 namespace {
 
 // Three rooms of 2 m in a row along x, parted by doors that fill the corridor: a lamp in the first, a little always-on
-// light in the last. A second set shines in a box of its own, far away.
+// light in the last. A second set shines on a box of its own, far away, in whose shadow leaves lie that do nothing.
 Scene threeRooms(bool walled_up = false) {
     Scene scene;
     scene.file = "three rooms";
@@ -18,7 +18,7 @@ Scene threeRooms(bool walled_up = false) {
     for (uint32_t d = 0; d < 2; ++d) {
         const glm::vec3 doorway(d == 0 ? -1 : 1, 0, 0);
         if (walled_up) addSolid(scene, "wall", doorway, {0.1f, 1, 1}, white);
-        addSolid(scene, "leaf", walled_up ? glm::vec3(60, 0, 0) : doorway, {0.1f, 1, 1}, white, d);
+        addSolid(scene, "leaf", walled_up ? glm::vec3(30, -3, 0) : doorway, {0.1f, 1, 1}, white, d);
     }
     scene.light_sets = {{"lamp", 1}, {"away", 1}};
     addPointLight(scene, {-2, 0.2f, 0.1f}, 100, BakeMode::Indirect).light_set = 0;
