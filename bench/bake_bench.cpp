@@ -84,10 +84,12 @@ void bareEmbree(benchmark::State& state) {
     rtcCommitScene(scene);
     for (auto _ : state) {
         tbb::parallel_for(size_t{0}, l.texels.size(), [&](size_t i) {
-            const uint32_t seed = hash(1, static_cast<uint32_t>(i)), points = l.texels.sampleCount(i);
+            const uint32_t seed = hash(1, static_cast<uint32_t>(i)), count = l.texels.sampleCount(i);
+            std::vector<SamplePoint> points;
+            for (uint32_t k = 0; k < count; ++k) points.push_back(samplePoint(*l.rays, l.charts, l.texels, i, k));
             float sum = 0;
             for (uint32_t r = 0; r < rays_per_texel; ++r) {
-                const SamplePoint& p = l.texels.sample(i, r % points);
+                const SamplePoint& p = points[r % count];
                 const TangentFrame& f = l.charts.frames[p.face];
                 const glm::vec3 d = cosineDirection(sequence2d(r, seed));
                 const glm::vec3 w = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
@@ -118,9 +120,10 @@ void finalGather(benchmark::State& state) {
         forEachBlock(l.texels.size(), [&](size_t begin, size_t end) {
             FinalGather<Gathered> gather(gatherer);
             std::vector<ReceiverLight> row;
+            std::vector<SamplePoint> points;
             for (size_t i = begin; i < end; ++i) {
                 row.clear();
-                gather.gather(gatherer.at(i), std::array{always_group}, l.outgoing, options, row);
+                gather.gather(gatherer.at(i, points), std::array{always_group}, l.outgoing, options, row);
                 benchmark::DoNotOptimize(row.data());
             }
         });

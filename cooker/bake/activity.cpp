@@ -142,8 +142,11 @@ SparseLight Activity::activeAround(const Series& series) const {
 // Charts that came with the level may hold islands that only the page has side by side.
 bool Activity::nearInSpace(size_t a, size_t b) const {
     const Texels& texels = gatherer_.texels();
+    const auto place = [&](size_t receiver) {
+        return samplePoint(gatherer_.rays(), gatherer_.unwrap(), texels, receiver, 0).position_m;
+    };
     const float size_m = std::sqrt(std::max(texels.area_m2[a], texels.area_m2[b]));
-    return glm::distance(texels.sample(a, 0).position_m, texels.sample(b, 0).position_m) <= around_texel_sizes * size_m;
+    return glm::distance(place(a), place(b)) <= around_texel_sizes * size_m;
 }
 
 void Activity::forEachAround(size_t texel, auto&& visit) const {

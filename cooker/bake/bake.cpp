@@ -29,6 +29,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
     auto light = Sparse<ReceiverLight>::build(receivers, [&](size_t begin, size_t end, auto emit) {
         FinalGather<Gathered> gather(gatherer);
         std::vector<ReceiverLight> row;
+        std::vector<SamplePoint> points;
         std::vector<uint32_t> terms, of_group, bounced;
         RowEnds own_ends;
         if (ends) own_ends.kept_max = ends->keptMax();
@@ -44,7 +45,7 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
             own_ends.clear();
             if (known && !terms.empty()) known->get(i, own_ends);
             if (!settings.per_set_passes)
-                traced += gather.gather(gatherer.at(i), terms, series.radiance, options, row,
+                traced += gather.gather(gatherer.at(i, points), terms, series.radiance, options, row,
                                         ends ? &own_ends : nullptr, bounced);
             if (remembers) all_ends.push_back(own_ends);
             for (uint32_t g = 0; settings.per_set_passes && g < gatherer.paths().groupCount(); ++g) {
@@ -52,7 +53,8 @@ Sparse<ReceiverLight> gatherAll(const Gatherer& gatherer, const Series& series, 
                 std::ranges::copy_if(terms, std::back_inserter(of_group),
                                      [&](uint32_t t) { return gatherer.paths().group(t) == g; });
                 if (of_group.empty()) continue;
-                traced += gather.gather(gatherer.at(i), of_group, series.radiance, options, row, nullptr, bounced);
+                traced +=
+                    gather.gather(gatherer.at(i, points), of_group, series.radiance, options, row, nullptr, bounced);
             }
             if (settings.per_set_passes) std::ranges::sort(row, {}, &ReceiverLight::term);
             // Neighbours' light may end at a wall that the chart runs under.
@@ -119,10 +121,10 @@ FollowedLight finishTexels(const Gatherer& gatherer, Series series, const BakeSe
     const Sparse<ReceiverLight> direct = std::move(series.stored_direct);
     FollowedLight followed{std::move(series.radiance), std::move(series.bounces)};
     series = {};
-    if (settings.denoise) baked.light = denoise(gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
+    if (settings.denoise)
+        baked.light = denoise(gatherer.rays(), gatherer.unwrap(), gatherer.texels(), std::move(baked.light), progress);
     if (settings.sharpen)
-        baked.light =
-            sharpen({gatherer.rays(), gatherer.unwrap(), gatherer.texels()}, std::move(baked.light), progress);
+        baked.light = sharpen({gatherer.unwrap(), gatherer.texels()}, std::move(baked.light), progress);
     addDirect(direct, gatherer.paths(), baked.light);
     for (size_t i = 0; i < baked.light.rows(); ++i)
         for (const ReceiverLight& l : baked.light.row(i)) ++baked.reports[l.term].receivers;

@@ -32,16 +32,17 @@ constexpr float off_plane_share = 0.25f;
 // Which texels lie beside each other on one surface, and what they hold in common.
 class Surface {
    public:
-    Surface(const Unwrap& unwrap, const Texels& texels) : unwrap_(unwrap), texels_(texels) {}
+    Surface(const RayScene& rays, const Unwrap& unwrap, const Texels& texels)
+        : rays_(rays), unwrap_(unwrap), texels_(texels) {}
 
     // The receiver so many texels away on the same surface; no_index where there is none.
     uint32_t neighbour(size_t receiver, int dx, int dy) const {
         const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx, dy);
         if (other == no_index || other == receiver) return other;
-        const SamplePoint &a = texels_.sample(receiver, 0), &b = texels_.sample(other, 0);
-        if (a.face == b.face || !unwrap_.charts[unwrap_.face_chart[a.face]].of_file) return other;
-        const bool alike = sameFrame(unwrap_.frames[a.face], unwrap_.frames[b.face]);
-        return alike && nearInSpace(a, b, dx, dy) ? other : no_index;
+        const uint32_t a = texels_.face(receiver), b = texels_.face(other);
+        if (a == b || !unwrap_.charts[unwrap_.face_chart[a]].of_file) return other;
+        if (!sameFrame(unwrap_.frames[a], unwrap_.frames[b])) return no_index;
+        return nearInSpace(firstPoint(receiver), firstPoint(other), dx, dy) ? other : no_index;
     }
 
     // visit(index in the receiver's row, entry) for the same terms of the texels around it. `counts`: how many each
@@ -62,6 +63,8 @@ class Surface {
     }
 
    private:
+    SamplePoint firstPoint(size_t receiver) const { return samplePoint(rays_, unwrap_, texels_, receiver, 0); }
+
     // As near as texels of one plane are, wherever in them samples lie: islands lie side by side on the page alone, and
     // may lie in parallel planes. By whole texels' size: what a border cuts off leaves them as far apart.
     bool nearInSpace(const SamplePoint& a, const SamplePoint& b, int dx, int dy) const {
@@ -73,6 +76,7 @@ class Surface {
                off_plane_m <= off_plane_share * std::max(glm::length(way), size_m);
     }
 
+    const RayScene& rays_;
     const Unwrap& unwrap_;
     const Texels& texels_;
 };
@@ -166,10 +170,10 @@ std::vector<uint32_t> lastReaders(const Surface& surface, size_t receivers, int 
 
 }  // namespace
 
-Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
-                              Progress& progress) {
+Sparse<ReceiverLight> denoise(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
+                              Sparse<ReceiverLight> light, Progress& progress) {
     progress.stage("denoise", texels.size() * (passes + 1));
-    const Surface surface(unwrap, texels);
+    const Surface surface(rays, unwrap, texels);
     const auto run = [&](int steps, int step, auto&& filter_row) {
         light.rewrite(lastReaders(surface, texels.size(), steps, step), [&](size_t begin, size_t end, auto row_of) {
             for (size_t i = begin; i < end; ++i) filter_row(i, row_of(i));

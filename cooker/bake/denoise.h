@@ -9,7 +9,7 @@ namespace dimmer::cook {
 // averaged with others of the same chart, the less the more their light of the same group differs for the noise of
 // both. A chart that came with the level may hold many islands, and curved ones: only what goes on one surface, and
 // tells directions by the same tangent frame, is averaged. Light groups are filtered apart. Deterministic.
-Sparse<ReceiverLight> denoise(const Unwrap& unwrap, const Texels& texels, Sparse<ReceiverLight> light,
-                              Progress& progress);
+Sparse<ReceiverLight> denoise(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
+                              Sparse<ReceiverLight> light, Progress& progress);
 
 }  // namespace dimmer::cook

@@ -203,22 +203,22 @@ class Gatherer {
         return receiver < texels_.size() ? texels_.reflectance[receiver]
                                          : models_->reflectance(receiver - texels_.size());
     }
-    GatherFrom at(size_t receiver) const {
+    // `points`: keeps them for the result, replaced.
+    GatherFrom at(size_t receiver, std::vector<SamplePoint>& points) const {
         if (receiver >= texels_.size()) {
             const size_t i = receiver - texels_.size();
             return {models_->points(i), static_cast<uint32_t>(receiver), no_condition, models_->model(i), true};
         }
-        return {{&texels_.sample(receiver, 0), texels_.sampleCount(receiver)},
-                static_cast<uint32_t>(receiver),
-                conditionOf(receiver),
-                no_model,
-                texels_.area_m2[receiver] > wide_texel_m2,
-                static_cast<uint32_t>(receiver)};
+        points.clear();
+        for (uint32_t i = 0; i < texels_.sampleCount(receiver); ++i)
+            points.push_back(samplePoint(rays_, unwrap_, texels_, receiver, i));
+        return {points,   static_cast<uint32_t>(receiver),           conditionOf(receiver),
+                no_model, texels_.area_m2[receiver] > wide_texel_m2, static_cast<uint32_t>(receiver)};
     }
     // no_condition but for the texels of doors' leaves.
     uint32_t conditionOf(size_t receiver) const {
         if (receiver >= texels_.size()) return no_condition;
-        return rays_.triangles()[unwrap_.faces[texels_.sample(receiver, 0).face].triangle].condition;
+        return rays_.triangles()[unwrap_.faces[texels_.face(receiver)].triangle].condition;
     }
 
     // Of a unit direction of the world, in the frame that the point's light is kept in; a probe's is the world's.

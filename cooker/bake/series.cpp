@@ -117,6 +117,7 @@ class Expansion {
             std::vector<TermLight> row, left_row;
             std::vector<ReceiverLight> stored_row;
             std::vector<uint32_t> hits(settings_.series_rays);
+            std::vector<SamplePoint> points;
             GatherLinks links;
             std::vector<Link> followed;
             RowEnds ends;
@@ -128,7 +129,8 @@ class Expansion {
                 if (known) known->get(i, ends);
                 own_options.row = ends.ends.size() < options.rays ? nullptr : &ends;
                 const Rounding rounding(i, Rounding::Of::Direct);
-                traced += directLight(gatherer_, grid_, gatherer_.at(i), sum, full, light_points) + options.rays;
+                const GatherFrom from = gatherer_.at(i, points);
+                traced += directLight(gatherer_, grid_, from, sum, full, light_points) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
                     const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;
@@ -140,7 +142,7 @@ class Expansion {
                 full.clear();
                 std::ranges::fill(hits, no_index);
                 links = {hits, {}, {}};
-                gatherer_.gather(gatherer_.at(i), own_options, nullptr, sum, &links);
+                gatherer_.gather(from, own_options, nullptr, sum, &links);
                 followed = links.through_doors;
                 for (const uint32_t hit : hits)
                     if (hit != no_index) followed.push_back({hit, free_path});

@@ -6,8 +6,8 @@
 
 namespace dimmer::cook {
 
-BilinearTaps::BilinearTaps(const RayScene& rays, const Unwrap& unwrap, const Texels& texels)
-    : rays_(rays), unwrap_(unwrap), texels_(texels), shown_(texels.receiver_at.size(), no_index) {
+BilinearTaps::BilinearTaps(const Unwrap& unwrap, const Texels& texels)
+    : unwrap_(unwrap), texels_(texels), shown_(texels.receiver_at.size(), no_index) {
     const auto at = [&](uint32_t address) -> uint32_t& {
         const size_t row = size_t{TexelAddress::page(address)} * unwrap.page_height + TexelAddress::y(address);
         return shown_[row * unwrap.page_width + TexelAddress::x(address)];
@@ -24,15 +24,14 @@ uint32_t BilinearTaps::shownAt(uint32_t page, glm::ivec2 texel) const {
 
 void BilinearTaps::around(uint32_t receiver, std::vector<Tap>& taps) const {
     taps.assign(1, {receiver, 0});
-    const uint32_t points = texels_.sampleCount(receiver), address = texels_.address[receiver];
-    const glm::vec2 texel(TexelAddress::x(address), TexelAddress::y(address));
+    const uint32_t points = texels_.sampleCount(receiver), page = TexelAddress::page(texels_.address[receiver]);
     for (uint32_t i = 0; i < points; ++i) {
-        const glm::vec2 place = placeOf(texels_.sample(receiver, i), texel) - 0.5f;
+        const glm::vec2 place = placeOnPage(texels_, receiver, i) - 0.5f;
         const glm::ivec2 first(glm::floor(place));
         const glm::vec2 along = place - glm::vec2(first);
         for (const glm::ivec2 corner : {glm::ivec2(0, 0), {1, 0}, {0, 1}, {1, 1}}) {
             const glm::vec2 share = glm::mix(1.0f - along, along, glm::vec2(corner));
-            uint32_t shown = shownAt(TexelAddress::page(address), first + corner);
+            uint32_t shown = shownAt(page, first + corner);
             if (shown == no_index || !framesAgree(shown, receiver)) shown = receiver;
             auto tap = std::ranges::find(taps, shown, &Tap::receiver);
             if (tap == taps.end()) tap = taps.insert(tap, {shown, 0});
@@ -41,22 +40,8 @@ void BilinearTaps::around(uint32_t receiver, std::vector<Tap>& taps) const {
     }
 }
 
-// On the page, within the texel. The point was lifted along the normal, which leaves its place on the triangle.
-glm::vec2 BilinearTaps::placeOf(const SamplePoint& point, glm::vec2 texel) const {
-    const uint32_t triangle = unwrap_.faces[point.face].triangle;
-    const glm::vec3 corner = rays_.corner(triangle, 0), way = point.position_m - corner;
-    const glm::vec3 edge1 = rays_.corner(triangle, 1) - corner, edge2 = rays_.corner(triangle, 2) - corner;
-    const glm::vec3 normal = glm::cross(edge1, edge2);
-    const float area2 = glm::dot(normal, normal);
-    if (!(area2 > 0)) return texel + 0.5f;
-    const float u = glm::dot(glm::cross(way, edge2), normal) / area2,
-                v = glm::dot(glm::cross(edge1, way), normal) / area2;
-    const auto& t = unwrap_.uv_texels[point.face];
-    return glm::clamp(t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]), texel, texel + 1.0f);
-}
-
 bool BilinearTaps::framesAgree(uint32_t a, uint32_t b) const {
-    return sameFrame(unwrap_.frames[texels_.sample(a, 0).face], unwrap_.frames[texels_.sample(b, 0).face]);
+    return sameFrame(unwrap_.frames[texels_.face(a)], unwrap_.frames[texels_.face(b)]);
 }
 
 }  // namespace dimmer::cook

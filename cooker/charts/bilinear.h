@@ -15,7 +15,7 @@ struct Tap {
 
 class BilinearTaps {
    public:
-    BilinearTaps(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
+    BilinearTaps(const Unwrap& unwrap, const Texels& texels);
 
     // What a texel of the pages holds the value of, padding included; no_index where it stays black.
     uint32_t shownAt(uint32_t page, glm::ivec2 texel) const;
@@ -25,10 +25,8 @@ class BilinearTaps {
     void around(uint32_t receiver, std::vector<Tap>& taps) const;
 
    private:
-    glm::vec2 placeOf(const SamplePoint& point, glm::vec2 texel) const;
     bool framesAgree(uint32_t a, uint32_t b) const;
 
-    const RayScene& rays_;
     const Unwrap& unwrap_;
     const Texels& texels_;
     std::vector<uint32_t> shown_;  // per page texel

@@ -79,7 +79,7 @@ class Padding {
 
     // The receiver of another chart of the same plane that lies under the fill's centre; no_index when there is none.
     uint32_t acrossSeam(const FillTexel& fill, uint32_t chart) const {
-        const SamplePoint& own = texels_.sample(fill.source, 0);
+        const SamplePoint own = samplePoint(rays_, unwrap_, texels_, fill.source, 0);
         const Face face = unwrap_.faces[own.face];
         const TangentFrame& frame = unwrap_.frames[own.face];
         const glm::vec3 centre =
@@ -96,7 +96,8 @@ class Padding {
         const uint32_t found = receiverOf(unwrap_, texels_, *hit);
         if (found == no_index || found == fill.source) return no_index;
         const glm::vec3 lift = frame.normal * wall_probe_low_m;
-        const glm::vec3 from = own.position_m + lift, to = texels_.sample(found, 0).position_m + lift;
+        const glm::vec3 from = own.position_m + lift,
+                        to = samplePoint(rays_, unwrap_, texels_, found, 0).position_m + lift;
         return rays_.blocked(from, to) || rays_.blocked(to, from) ? no_index : found;
     }
 

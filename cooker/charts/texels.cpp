@@ -23,6 +23,7 @@ constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
 // A texel whose first points all lie inside geometry is given up.
 constexpr uint32_t drops_max = 24;
+constexpr float steps_per_texel = TexelPoint::steps;
 // Receivers within such a cell stand in the order of their page; a level has at most so many along an axis.
 constexpr float cell_m = 1, cells_max = (1 << 21) - 1;
 
@@ -50,15 +51,37 @@ std::vector<Covered> coverConservatively(const Unwrap& unwrap) {
 
 // Halton points of the unit square, shifted so that the first `count`, which a whole texel takes, have their centre of
 // gravity in the middle: light that changes evenly across a texel is then right at its centre, where it is looked up.
-std::vector<glm::vec2> centredHalton(uint32_t count) {
+std::vector<glm::u16vec2> centredHalton(uint32_t count) {
     std::vector<glm::vec2> points;
     glm::vec2 sum(0);
     for (uint32_t i = 0; i < std::max(halton_tries, count); ++i) {
         points.emplace_back(radicalInverse(2, i), radicalInverse(3, i));
         if (i < count) sum += points.back();
     }
-    for (glm::vec2& p : points) p = glm::fract(p + 0.5f - sum / static_cast<float>(count));
-    return points;
+    std::vector<glm::u16vec2> steps;
+    for (const glm::vec2 p : points) {
+        const glm::vec2 within = glm::fract(p + 0.5f - sum / static_cast<float>(count));
+        steps.emplace_back(glm::min(glm::round(within * steps_per_texel), steps_per_texel - 1));
+    }
+    return steps;
+}
+
+glm::vec2 placeIn(glm::uvec2 texel, glm::u16vec2 within) {
+    return glm::vec2(texel) + glm::vec2(within) / steps_per_texel;
+}
+
+// Barycentric, of a place on a face of the page or just beside it.
+glm::vec2 weightsAt(const Unwrap& unwrap, uint32_t face, glm::vec2 place) {
+    const auto& t = unwrap.uv_texels[face];
+    const float area = cross2d(t[1] - t[0], t[2] - t[0]);
+    const glm::vec2 w(cross2d(place - t[0], t[2] - t[0]) / area, cross2d(t[1] - t[0], place - t[0]) / area);
+    return glm::clamp(w, glm::vec2(0), glm::vec2(1));
+}
+
+SamplePoint pointAt(const RayScene& rays, const Unwrap& unwrap, uint32_t face, glm::vec2 place) {
+    const glm::vec2 weights = weightsAt(unwrap, face, place);
+    const glm::vec3 on_surface = rays.pointOn(unwrap.faces[face].triangle, weights.x, weights.y);
+    return {on_surface + unwrap.frames[face].normal * liftOff(on_surface, lift_m), face};
 }
 
 class TexelSampler {
@@ -67,7 +90,8 @@ class TexelSampler {
         : rays_(rays), unwrap_(unwrap), samples_max_(samples_max), tries_(centredHalton(samples_max)) {}
 
     struct Result {
-        std::vector<SamplePoint> points;
+        std::vector<TexelPoint> points;
+        glm::vec3 place_m{0};  // of the first point
         float area_m2 = 0;
         glm::vec3 reflectance{0};
     };
@@ -77,87 +101,84 @@ class TexelSampler {
         const uint64_t texel = faces[0].texel;
         const auto x = static_cast<uint32_t>(texel % unwrap_.page_width);
         const auto y = static_cast<uint32_t>(texel / unwrap_.page_width % unwrap_.page_height);
+        const glm::uvec2 corner(x, y);
         Usable usable;
-        for (const glm::vec2 within : tries_) {
+        for (const glm::u16vec2 within : tries_) {
             if (result.points.size() >= samples_max_) break;
             if (result.points.empty() && usable.dropped >= drops_max) break;
-            if (const auto at = surfaceAt(faces, glm::vec2(x, y) + within)) tryPoint(*at, usable, result);
+            if (const auto at = surfaceAt(faces, corner, within)) tryPoint(corner, *at, usable, result);
         }
         float largest = 0;
-        SurfacePoint centroid{};
+        TexelPoint centroid;
         for (const Covered& c : faces) {
             const auto polygon = clipToCell(unwrap_.uv_texels[c.face], x, y);
             const float area = polygonArea(polygon);
             result.area_m2 += area * unwrap_.texel_area_m2[c.face];
             if (area <= largest) continue;
             largest = area;
-            centroid = {c.face, weightsAt(c.face, mean(polygon))};
+            const glm::vec2 within = (mean(polygon) - glm::vec2(corner)) * steps_per_texel;
+            const glm::u16vec2 steps(glm::clamp(within, 0.0f, steps_per_texel - 1));
+            centroid = {c.face, steps.x, steps.y};
         }
-        if (usable.tried == 0 && largest > 0) tryPoint(centroid, usable, result);
+        if (usable.tried == 0 && largest > 0) tryPoint(corner, centroid, usable, result);
         // All of it lies in a closed door's leaf: what an opening uncovers.
         if (result.points.empty()) result.points = std::move(usable.in_leaf);
         // Few points may all lie in holes of what rays do hit.
         if (usable.tried > 0 && usable.alpha == 0)
-            for (const glm::vec2 within : tries_)
-                if (const auto at = surfaceAt(faces, glm::vec2(x, y) + within)) addReflectance(*at, usable, result);
+            for (const glm::u16vec2 within : tries_)
+                if (const auto at = surfaceAt(faces, corner, within)) addReflectance(corner, *at, usable, result);
         if (usable.alpha > 0) result.reflectance /= usable.alpha;
-        if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(result.points);
+        if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(corner, result.points);
+        if (!result.points.empty()) result.place_m = positionM(corner, result.points[0]);
         return result;
     }
 
    private:
-    struct SurfacePoint {
-        uint32_t face;
-        glm::vec2 weights;
-    };
-
     static glm::vec2 mean(const std::vector<glm::vec2>& polygon) {
         glm::vec2 sum(0);
         for (glm::vec2 p : polygon) sum += p;
         return sum / static_cast<float>(polygon.size());
     }
 
-    std::optional<SurfacePoint> surfaceAt(std::span<const Covered> faces, glm::vec2 p) const {
-        for (const Covered& c : faces)
-            if (const auto weights = barycentric(unwrap_.uv_texels[c.face], p)) return SurfacePoint{c.face, *weights};
-        return std::nullopt;
+    glm::vec3 positionM(glm::uvec2 texel, const TexelPoint& p) const {
+        return pointAt(rays_, unwrap_, p.face, placeIn(texel, {p.x, p.y})).position_m;
     }
 
-    glm::vec2 weightsAt(uint32_t face, glm::vec2 p) const {
-        const auto& t = unwrap_.uv_texels[face];
-        const float area = cross2d(t[1] - t[0], t[2] - t[0]);
-        const glm::vec2 w(cross2d(p - t[0], t[2] - t[0]) / area, cross2d(t[1] - t[0], p - t[0]) / area);
-        return glm::clamp(w, glm::vec2(0), glm::vec2(1));
+    std::optional<TexelPoint> surfaceAt(std::span<const Covered> faces, glm::uvec2 texel, glm::u16vec2 within) const {
+        for (const Covered& c : faces)
+            if (barycentric(unwrap_.uv_texels[c.face], placeIn(texel, within)))
+                return TexelPoint{c.face, within.x, within.y};
+        return std::nullopt;
     }
 
     struct Usable {
         uint32_t tried = 0, dropped = 0;
-        float alpha = 0;                   // sum over what the reflectance was added up over
-        std::vector<SamplePoint> in_leaf;  // of the dropped ones
+        float alpha = 0;                  // sum over what the reflectance was added up over
+        std::vector<TexelPoint> in_leaf;  // of the dropped ones
     };
 
-    void tryPoint(const SurfacePoint& s, Usable& usable, Result& result) const {
-        const uint32_t triangle = unwrap_.faces[s.face].triangle;
-        const glm::vec3 on_surface = rays_.pointOn(triangle, s.weights.x, s.weights.y);
-        const glm::vec3 position = on_surface + unwrap_.frames[s.face].normal * liftOff(on_surface, lift_m);
-        addReflectance(s, usable, result);
+    void tryPoint(glm::uvec2 texel, const TexelPoint& p, Usable& usable, Result& result) const {
+        const uint32_t triangle = unwrap_.faces[p.face].triangle;
+        const glm::vec3 position = positionM(texel, p);
+        addReflectance(texel, p, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
-        if (!insideGeometry(s.face, nearest)) {
-            result.points.push_back({position, s.face});
+        if (!insideGeometry(p.face, nearest)) {
+            result.points.push_back(p);
             return;
         }
         ++usable.dropped;
         const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
-        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !insideGeometry(s.face, stays))
-            usable.in_leaf.push_back({position, s.face});
+        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !insideGeometry(p.face, stays))
+            usable.in_leaf.push_back(p);
     }
 
     // Light that hits a texel hits it where it is not cut out: colours count by how much of it they stop.
-    void addReflectance(const SurfacePoint& s, Usable& usable, Result& result) const {
-        const uint32_t triangle = unwrap_.faces[s.face].triangle;
-        const float alpha = rays_.alphaAt(triangle, s.weights.x, s.weights.y);
-        const glm::vec4 color = rays_.surfaceColor(triangle, s.weights.x, s.weights.y);
+    void addReflectance(glm::uvec2 texel, const TexelPoint& p, Usable& usable, Result& result) const {
+        const uint32_t triangle = unwrap_.faces[p.face].triangle;
+        const glm::vec2 weights = weightsAt(unwrap_, p.face, placeIn(texel, {p.x, p.y}));
+        const float alpha = rays_.alphaAt(triangle, weights.x, weights.y);
+        const glm::vec4 color = rays_.surfaceColor(triangle, weights.x, weights.y);
         result.reflectance +=
             alpha * rays_.scene().materials[rays_.triangles()[triangle].material].reflectance(glm::vec3(color));
         usable.alpha += alpha;
@@ -193,12 +214,14 @@ class TexelSampler {
     }
 
     // Part of the texel lies inside a wall: of the parts on its two sides, the one with more points stays.
-    void keepOneSideOfWalls(std::vector<SamplePoint>& points) const {
+    void keepOneSideOfWalls(glm::uvec2 texel, std::vector<TexelPoint>& points) const {
         size_t best = 0, best_count = 0;
-        std::vector<std::vector<SamplePoint>> seen(points.size());
+        std::vector<glm::vec3> places_m;
+        for (const TexelPoint& p : points) places_m.push_back(positionM(texel, p));
+        std::vector<std::vector<TexelPoint>> seen(points.size());
         for (size_t a = 0; a < points.size(); ++a) {
-            for (const SamplePoint& b : points)
-                if (&b == &points[a] || !rays_.blocked(points[a].position_m, b.position_m)) seen[a].push_back(b);
+            for (size_t b = 0; b < points.size(); ++b)
+                if (a == b || !rays_.blocked(places_m[a], places_m[b])) seen[a].push_back(points[b]);
             if (seen[a].size() > best_count) best_count = seen[a].size(), best = a;
         }
         points = seen[best];
@@ -207,7 +230,7 @@ class TexelSampler {
     const RayScene& rays_;
     const Unwrap& unwrap_;
     uint32_t samples_max_;
-    std::vector<glm::vec2> tries_;
+    std::vector<glm::u16vec2> tries_;
 };
 
 // The bits of a coordinate, two zeros after each.
@@ -225,11 +248,11 @@ uint64_t spread(uint32_t bits) {
 std::vector<uint32_t> bySpace(std::span<const TexelSampler::Result> texels) {
     glm::vec3 low(std::numeric_limits<float>::max());
     for (const auto& t : texels)
-        if (!t.points.empty()) low = glm::min(low, t.points[0].position_m);
+        if (!t.points.empty()) low = glm::min(low, t.place_m);
     std::vector<std::pair<uint64_t, uint32_t>> order;
     for (uint32_t i = 0; i < texels.size(); ++i) {
         if (texels[i].points.empty()) continue;
-        const glm::uvec3 cell(glm::min((texels[i].points[0].position_m - low) / cell_m, cells_max));
+        const glm::uvec3 cell(glm::min((texels[i].place_m - low) / cell_m, cells_max));
         order.emplace_back(spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, i);
     }
     std::ranges::sort(order);
@@ -277,9 +300,19 @@ Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples
     return out;
 }
 
+glm::vec2 placeOnPage(const Texels& texels, size_t receiver, uint32_t i) {
+    const uint32_t address = texels.address[receiver];
+    const TexelPoint& p = texels.sample(receiver, i);
+    return placeIn({TexelAddress::x(address), TexelAddress::y(address)}, {p.x, p.y});
+}
+
+SamplePoint samplePoint(const RayScene& rays, const Unwrap& unwrap, const Texels& texels, size_t receiver, uint32_t i) {
+    return pointAt(rays, unwrap, texels.sample(receiver, i).face, placeOnPage(texels, receiver, i));
+}
+
 uint32_t neighbourInChart(const Unwrap& unwrap, const Texels& texels, size_t receiver, int dx, int dy) {
     const uint32_t address = texels.address[receiver];
-    const Chart& chart = unwrap.charts[unwrap.face_chart[texels.sample(receiver, 0).face]];
+    const Chart& chart = unwrap.charts[unwrap.face_chart[texels.face(receiver)]];
     const int x = static_cast<int>(TexelAddress::x(address)) + dx, y = static_cast<int>(TexelAddress::y(address)) + dy;
     if (x < static_cast<int>(chart.x) || y < static_cast<int>(chart.y) ||
         x >= static_cast<int>(chart.x + chart.width) || y >= static_cast<int>(chart.y + chart.height))

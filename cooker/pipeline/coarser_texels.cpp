@@ -67,7 +67,7 @@ CoarserTexels::CoarserTexels(const Texels& texels, std::span<const uint32_t> fac
     : floor_lux_(floor_lux) {
     std::vector<std::vector<uint32_t>> of_chart(fixed.size());
     for (uint32_t i = 0; i < texels.size(); ++i) {
-        const uint32_t chart = face_chart[texels.sample(i, 0).face];
+        const uint32_t chart = face_chart[texels.face(i)];
         all_m2_ += static_cast<double>(texels.area_m2[i]);
         if (!fixed[chart]) of_chart[chart].push_back(i);
     }

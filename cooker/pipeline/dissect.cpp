@@ -59,7 +59,7 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     bake->emitters.emplace(*level.rays, meshGroups(level.scene));
     bake->paths.emplace(level.scene, doorsInSight(*level.rays));
     bake->gatherer.emplace(*level.rays, level.charts, bake->texels, *bake->emitters, *bake->paths);
-    bake->taps.emplace(*level.rays, level.charts, bake->texels);
+    bake->taps.emplace(level.charts, bake->texels);
     bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
     return bake;
 }
@@ -113,7 +113,7 @@ Footprint footprintOf(const Rebake& bake, const Pack& pack, const VerifyPoint& p
         if (receiver == no_index || !(share > 0)) continue;
         out.stored.push_back({receiver, share});
         for (uint32_t s = 0; s < bake.texels.sampleCount(receiver); ++s) {
-            const SamplePoint& sample = bake.texels.sample(receiver, s);
+            const SamplePoint sample = samplePoint(*bake.level->rays, bake.level->charts, bake.texels, receiver, s);
             const float distance = glm::distance(sample.position_m, p.position_m);
             if (glm::dot(bake.level->charts.frames[sample.face].normal, p.frame.normal) < same_normal_cos) continue;
             if (!(distance < nearest)) continue;
@@ -164,6 +164,7 @@ Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const 
     std::iota(all.begin(), all.end(), 0u);
     FinalGather<Gathered> gather(*bake.gatherer);
     std::vector<ReceiverLight> row;
+    std::vector<SamplePoint> points;
 
     const Footprint footprint = footprintOf(bake, pack, p);
     if (footprint.stored.empty() || !footprint.centre) return {};
@@ -172,7 +173,7 @@ Steps stepsAt(const Rebake& bake, const Pack& pack, const VerifyPoint& p, const 
     options.rays_max = texel_rays;
     for (const auto& [receiver, share] : footprint.gathered) {
         row.clear();
-        gather.gather(bake.gatherer->at(receiver), all, bake.series.radiance, options, row);
+        gather.gather(bake.gatherer->at(receiver, points), all, bake.series.radiance, options, row);
         bake.series.activeTerms(receiver, active);
         const auto weight = static_cast<double>(share);
         for (const ReceiverLight& l : row) {

@@ -37,20 +37,23 @@ struct BakedScene {
             if (l.term == term) return l.light.irradiance_lux;
         return glm::vec3(0);
     }
-    glm::vec3 normal(size_t receiver) const { return charts.frames[texels.sample(receiver, 0).face].normal; }
+    glm::vec3 normal(size_t receiver) const { return charts.frames[texels.face(receiver)].normal; }
     // Name of the mesh that a receiver belongs to.
     const std::string& meshOf(size_t receiver) const {
-        const Face& face = charts.faces[texels.sample(receiver, 0).face];
+        const Face& face = charts.faces[texels.face(receiver)];
         return scene.meshes[rays->triangles()[face.triangle].mesh].node;
     }
     // Mean of f(position) over a receiver's sample points: what a bake of f's light must give there.
     double mean(size_t receiver, auto&& f) const {
         double sum = 0;
         const uint32_t n = texels.sampleCount(receiver);
-        for (uint32_t i = 0; i < n; ++i) sum += f(glm::dvec3(texels.sample(receiver, i).position_m));
+        for (uint32_t i = 0; i < n; ++i) sum += f(glm::dvec3(position(receiver, i)));
         return sum / n;
     }
-    glm::vec3 place(size_t receiver) const { return texels.sample(receiver, 0).position_m; }
+    glm::vec3 position(size_t receiver, uint32_t i) const {
+        return samplePoint(*rays, charts, texels, receiver, i).position_m;
+    }
+    glm::vec3 place(size_t receiver) const { return position(receiver, 0); }
 
     Scene scene;
     std::unique_ptr<RayScene> rays;

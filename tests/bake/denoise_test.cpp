@@ -46,7 +46,7 @@ std::vector<float> denoised(const BakedScene& b, float deviation, auto&& luxAt) 
         }
     };
     SilentProgress quiet;
-    const auto light = denoise(b.charts, b.texels, Sparse<ReceiverLight>::build(b.texels.size(), fill), quiet);
+    const auto light = denoise(*b.rays, b.charts, b.texels, Sparse<ReceiverLight>::build(b.texels.size(), fill), quiet);
     std::vector<float> lux;
     for (size_t i = 0; i < light.rows(); ++i) lux.push_back(light.row(i)[0].light.irradiance_lux.x);
     return lux;
@@ -69,9 +69,7 @@ TEST(Denoise, IslandsSideBySideOnAPageDoNotMix) {
             addPatch(mesh, other.centre, other.u, other.v, {0.5f, 0}, {1, 0.5f});
         }));
         ASSERT_EQ(b.texels.size(), 128u);
-        const auto luxAt = [&](size_t i) {
-            return b.charts.faces[b.texels.sample(i, 0).face].triangle < 2 ? 100.0f : 10.0f;
-        };
+        const auto luxAt = [&](size_t i) { return b.charts.faces[b.texels.face(i)].triangle < 2 ? 100.0f : 10.0f; };
         const std::vector<float> lux = denoised(b, 1000, luxAt);
         // Means of equal numbers: rounding alone.
         for (size_t i = 0; i < lux.size(); ++i) EXPECT_NEAR(lux[i], luxAt(i), 1e-3f) << i;

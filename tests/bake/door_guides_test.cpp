@@ -92,7 +92,8 @@ void expectLessNoise(const Scene& scene, const glm::mat3& turned, double gain_mi
             double sum = 0, squares = 0;
             for (uint32_t seed = 0; seed < seeds; ++seed) {
                 std::vector<ReceiverLight> row;
-                gather.gather(gatherer.at(i), {&through, 1}, series.radiance,
+                std::vector<SamplePoint> points;
+                gather.gather(gatherer.at(i, points), {&through, 1}, series.radiance,
                               {.rays_max = (aim ? aimed_rounds : 9) * rays_per_round,
                                .emitter_samples = 0,
                                .seed = 1000 + seed,
@@ -201,7 +202,8 @@ TEST(DoorRays, FindWhatAnOpeningShowsWithLessNoise) {
             for (const uint32_t seed : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u})
                 for (const bool more : {false, true}) {
                     TermAccumulator<Gathered> sum(paths.termCount());
-                    gatherer.gather(gatherer.at(i),
+                    std::vector<SamplePoint> points;
+                    gatherer.gather(gatherer.at(i, points),
                                     {.rays = 16,
                                      .emitter_samples = panel ? 1u : 0u,
                                      .seed = seed,

@@ -48,7 +48,7 @@ Compared compare(const BakedScene& b, const Scene& level, uint32_t open, uint32_
         double reference = 0;
         const uint32_t n = b.texels.sampleCount(i);
         for (uint32_t p = 0; p < n; ++p) {
-            const auto v = tracer.irradiance({b.texels.sample(i, p).position_m, b.normal(i)}, paths / n);
+            const auto v = tracer.irradiance({b.position(i, p), b.normal(i)}, paths / n);
             reference += static_cast<double>(v.irradiance_lux.y) / n;
             variance += std::pow(static_cast<double>(v.standard_error_lux.y) / n, 2);
         }

@@ -121,8 +121,9 @@ Direct directOf(const BakedScene& b, bool enabled) {
     const EmitterSampler emitters(*b.rays, meshGroups(b.scene));
     const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
     TermAccumulator<Gathered> reflected(paths.termCount()), stored(paths.termCount());
+    std::vector<SamplePoint> points;
     for (size_t i = 0; i < b.texels.size(); ++i) {
-        out.rays += directLight(gatherer, grid, gatherer.at(i), reflected, stored);
+        out.rays += directLight(gatherer, grid, gatherer.at(i, points), reflected, stored);
         auto& row = out.rows.emplace_back();
         for (const uint32_t g : reflected.touched()) row.emplace_back(g, reflected[g].irradiance_lux);
         reflected.clear();

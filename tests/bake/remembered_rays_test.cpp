@@ -50,7 +50,8 @@ struct Gathering {
         GatherOptions options;
         options.emitter_samples = 0;
         options.row = row;
-        gatherer.gather(gatherer.at(receiver), options, &outgoing, sum, nullptr);
+        std::vector<SamplePoint> points;
+        gatherer.gather(gatherer.at(receiver, points), options, &outgoing, sum, nullptr);
         std::vector<glm::vec3> lux(paths.termCount(), glm::vec3(0));
         for (const uint32_t t : sum.touched()) lux[t] = sum[t].irradiance_lux;
         return lux;
@@ -105,7 +106,8 @@ TEST(RememberedRays, GoOnWhereTheyEnd) {
         options.noise_max = 0;
         options.floor_lux = floors;
         std::vector<ReceiverLight> light;
-        gather.gather(gathering.gatherer.at(receiver), terms, gathering.outgoing, options, light, row);
+        std::vector<SamplePoint> points;
+        gather.gather(gathering.gatherer.at(receiver, points), terms, gathering.outgoing, options, light, row);
         std::vector<glm::vec3> lux;
         for (const ReceiverLight& l : light) lux.push_back(l.light.irradiance_lux);
         return lux;

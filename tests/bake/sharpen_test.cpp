@@ -29,8 +29,7 @@ std::vector<double> sharpened(const BakedScene& b, float deviation, auto&& luxAt
         }
     };
     SilentProgress quiet;
-    const auto light =
-        sharpen({*b.rays, b.charts, b.texels}, Sparse<ReceiverLight>::build(b.texels.size(), fill), quiet);
+    const auto light = sharpen({b.charts, b.texels}, Sparse<ReceiverLight>::build(b.texels.size(), fill), quiet);
     std::vector<double> lux;
     for (size_t i = 0; i < light.rows(); ++i) {
         const auto row = light.row(i);
@@ -88,7 +87,7 @@ Miss missOf(const BakedScene& b, const std::vector<double>& lux, auto&& counts, 
 
 // Of a texel, on the plane of its face.
 glm::dvec3 centreOf(const BakedScene& b, size_t receiver) {
-    const uint32_t face = b.texels.sample(receiver, 0).face, triangle = b.charts.faces[face].triangle;
+    const uint32_t face = b.texels.face(receiver), triangle = b.charts.faces[face].triangle;
     const glm::dvec2 at(TexelAddress::x(b.texels.address[receiver]) + 0.5,
                         TexelAddress::y(b.texels.address[receiver]) + 0.5);
     const auto& t = b.charts.uv_texels[face];
@@ -195,7 +194,7 @@ TEST(Sharpen, InPlaceWhatIsReadOverASeamIsAsItWas) {
     addQuad(scene, "second", {0, 0, 64}, {0, 0, 64}, {64, 0, 0}, paint);
     const BakedScene b(scene, 4, 2);
     ASSERT_GT(b.texels.size(), size_t{2} * 256 * rows_per_block - 1);
-    const BilinearTaps taps(*b.rays, b.charts, b.texels);
+    const BilinearTaps taps(b.charts, b.texels);
     size_t far = 0;
     std::vector<Tap> around;
     for (size_t i = 0; i < b.texels.size(); ++i) {

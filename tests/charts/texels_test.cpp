@@ -38,7 +38,8 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
             ++whole;
             ASSERT_EQ(texels.sampleCount(i), count);
             glm::dvec2 sum(0);
-            for (uint32_t s = 0; s < count; ++s) sum += texelsOf(rays, *charts, texels.sample(i, s));
+            for (uint32_t s = 0; s < count; ++s)
+                sum += texelsOf(rays, *charts, samplePoint(rays, *charts, texels, i, s));
             const glm::dvec2 centre = glm::floor(sum / static_cast<double>(count)) + 0.5;
             // Floats of metres over texels of 0.25 m leave 1e-5 texels; Halton points as they come lie up to 0.17 off.
             EXPECT_NEAR(sum.x / count, centre.x, 1e-4) << count;
@@ -46,6 +47,28 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
         }
         EXPECT_GT(whole, 200u);
     }
+}
+
+// Pages mix what lies far apart: a bake goes from place to place all the same, and each is one run of receivers.
+TEST(Texels, StandInTheOrderOfSpace) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    for (const float y : {0.0f, 1.0f, 2.0f})
+        for (const float x : {40.0f, -40.0f}) addQuad(scene, "floor", {x, y, 0}, {0, 0, 2}, {2, 0, 0}, white);
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+    ASSERT_TRUE(charts.has_value());
+    const Texels texels = sampleTexels(rays, *charts, 1);
+    ASSERT_GT(texels.size(), 6u * 100);
+    size_t page_runs = 1, runs = 1;
+    std::vector<std::pair<uint32_t, bool>> by_page;
+    const auto isLeft = [&](size_t i) { return samplePoint(rays, *charts, texels, i, 0).position_m.x < 0; };
+    for (size_t i = 0; i < texels.size(); ++i) by_page.emplace_back(texels.address[i], isLeft(i));
+    for (size_t i = 1; i < texels.size(); ++i) runs += by_page[i].second != by_page[i - 1].second;
+    std::ranges::sort(by_page);
+    for (size_t i = 1; i < by_page.size(); ++i) page_runs += by_page[i].second != by_page[i - 1].second;
+    EXPECT_EQ(runs, 2u);
+    EXPECT_GT(page_runs, 4u);  // else the level says nothing
 }
 
 // A rug of the floor's outline, 3 mm over it: no texel is of both, and the rug's are whole.
@@ -60,13 +83,13 @@ TEST(Texels, OfAThinRugAreNotTheFloors) {
     const Texels texels = sampleTexels(rays, *charts, 4);
     size_t of_rug = 0;
     for (size_t i = 0; i < texels.size(); ++i) {
-        const bool is_rug = texels.sample(i, 0).position_m.y > 0.003f;
+        const bool is_rug = samplePoint(rays, *charts, texels, i, 0).position_m.y > 0.003f;
         if (is_rug) {
             ++of_rug;
             EXPECT_EQ(texels.sampleCount(i), 4u);
         }
         for (uint32_t s = 0; s < texels.sampleCount(i); ++s)
-            EXPECT_EQ(texels.sample(i, s).position_m.y > 0.003f, is_rug);
+            EXPECT_EQ(samplePoint(rays, *charts, texels, i, s).position_m.y > 0.003f, is_rug);
     }
     EXPECT_EQ(of_rug, 64u);  // 2 m x 2 m
 }

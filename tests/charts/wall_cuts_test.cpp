@@ -38,7 +38,7 @@ void expectRoomsApart(const RayScene& rays, const Unwrap& charts, const glm::mat
     size_t points = 0;
     for (size_t i = 0; i < texels.size(); ++i)
         for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
-            const glm::vec3 p = glm::transpose(turned) * texels.sample(i, s).position_m;
+            const glm::vec3 p = glm::transpose(turned) * samplePoint(rays, charts, texels, i, s).position_m;
             const uint32_t face = texels.sample(i, s).face;
             const bool in_rooms = p.y > -0.05f && p.y < 2.75f && std::abs(p.x) > half_wall_m;
             if (!in_rooms || std::abs(charts.frames[face].normal.y) < 0.9f) continue;
