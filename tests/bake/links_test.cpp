@@ -41,6 +41,7 @@ TEST(Links, AreReadAsTheyWerePut) {
             for (const uint32_t paths : {1u, 3u, 100'000u})
                 expectReadAsPut(receivers, [&](size_t row) {
                     std::vector<Link> links;
+                    if (receivers > 1000 && row % 61 != 0) return links;  // of many, some in every block
                     const auto seed = static_cast<uint32_t>(row);
                     for (uint32_t i = 0; i < hash(seed, most) % (most + 1); ++i) {
                         const uint32_t at = hash(seed, i), over = hash(at, 1);
