@@ -153,15 +153,16 @@ class LightmapFilter {
     Sparse<float> means_;  // of the luminance around each entry of light_
 };
 
-// Per block of receivers: the last one with receivers at most `steps` times `step` texels away.
-std::vector<uint32_t> lastReaders(const Surface& surface, size_t receivers, int steps, int step) {
-    std::vector<uint32_t> last(blockCount(receivers));
-    forEachBlock(receivers, [&](size_t begin, size_t end) {
+// Per block of receivers: the last one with receivers at most `steps` times `step` texels away, which may read them.
+std::vector<uint32_t> lastReaders(const Unwrap& unwrap, const Texels& texels, int steps, int step) {
+    std::vector<uint32_t> last(blockCount(texels.size()));
+    forEachBlock(texels.size(), [&](size_t begin, size_t end) {
         uint32_t furthest = 0;
         for (size_t i = begin; i < end; ++i)
             for (int dy = -steps; dy <= steps; ++dy)
                 for (int dx = -steps; dx <= steps; ++dx)
-                    if (const uint32_t other = surface.neighbour(i, dx * step, dy * step); other != no_index)
+                    if (const uint32_t other = neighbourInChart(unwrap, texels, i, dx * step, dy * step);
+                        other != no_index)
                         furthest = std::max(furthest, other);
         last[begin / rows_per_block] = static_cast<uint32_t>(furthest / rows_per_block);
     });
@@ -175,7 +176,7 @@ Sparse<ReceiverLight> denoise(const RayScene& rays, const Unwrap& unwrap, const 
     progress.stage("denoise", texels.size() * (passes + 1));
     const Surface surface(rays, unwrap, texels);
     const auto run = [&](int steps, int step, auto&& filter_row) {
-        light.rewrite(lastReaders(surface, texels.size(), steps, step), [&](size_t begin, size_t end, auto row_of) {
+        light.rewrite(lastReaders(unwrap, texels, steps, step), [&](size_t begin, size_t end, auto row_of) {
             for (size_t i = begin; i < end; ++i) filter_row(i, row_of(i));
             progress.advance(end - begin);
         });

@@ -1,5 +1,6 @@
 #include <bake/near_lamps.h>
 
+#include <bake/punctual.h>
 #include <charts/raster.h>
 #include <pack/pack_data.h>
 
@@ -10,8 +11,8 @@ namespace dimmer::cook {
 namespace {
 
 constexpr float near_widths = 2;
-// Between the middle of what the points are on and theirs: half of a texel is a quarter of its width away.
-constexpr float apart_max_widths = 0.2f;
+// Between the middle of what the points are on and theirs: what hides a fifth of a texel moves it as far.
+constexpr float apart_max_widths = 0.1f;
 // Faces with points that make up less of a texel are not all that it is of.
 constexpr float covered_min = 0.99f;
 
@@ -109,20 +110,21 @@ float nearLampScale(const Gatherer& gatherer, const GatherFrom& from, glm::vec3 
     if (std::ranges::none_of(from.points, isNear)) return 1;
     const TexelPieces pieces(gatherer, from);
     if (!(pieces.areaM2() > 0)) return 1;
-    // Of an even lamp of 1 cd.
+    // Of an even lamp of 1 cd, as illuminate() has it.
     double points_lux = 0;
     glm::dvec3 middle(0);
     for (const SamplePoint& p : from.points) {
         const glm::dvec3 to_lamp = glm::dvec3(lamp_m) - glm::dvec3(p.position_m);
-        const double distance2 = glm::dot(to_lamp, to_lamp);
+        const double distance_m = glm::length(to_lamp);
         const double height_m = glm::dot(to_lamp, glm::dvec3(gatherer.frameOf(p).normal));
-        if (height_m > 0) points_lux += height_m / (distance2 * std::sqrt(distance2));
+        const double clamped_m = std::max(distance_m, static_cast<double>(lamp_distance_min_m));
+        if (height_m > 0) points_lux += height_m / (distance_m * clamped_m * clamped_m);
         middle += glm::dvec3(p.position_m);
     }
     const auto count = static_cast<double>(from.points.size());
     if (glm::distance(middle / count, pieces.centreM()) > static_cast<double>(apart_max_widths * width_m)) return 1;
-    if (!(points_lux > 0)) return 1;
-    return static_cast<float>(pieces.solidAngleFrom(lamp_m) / pieces.areaM2() / (points_lux / count));
+    const double scale = pieces.solidAngleFrom(lamp_m) / pieces.areaM2() / (points_lux / count);
+    return std::isfinite(scale) ? static_cast<float>(scale) : 1;  // no point sees it; or it is a corner of the texel
 }
 
 }  // namespace dimmer::cook

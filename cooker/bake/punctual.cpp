@@ -9,8 +9,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr float distance_min_m = 0.01f;
-
 float window(const PunctualLight& light, float distance_m) {
     if (!light.range_m) return 1;
     const float ratio = distance_m / *light.range_m;
@@ -36,7 +34,7 @@ Illumination illuminate(const PunctualLight& light, glm::vec3 point) {
     const float distance_m = glm::length(to_light);
     if (!(distance_m > 0)) return {};
     const glm::vec3 direction = to_light / distance_m;
-    const float clamped = std::max(distance_m, distance_min_m);
+    const float clamped = std::max(distance_m, lamp_distance_min_m);
     float factor = window(light, distance_m) / (clamped * clamped);
     if (light.type == LightType::Spot) factor *= cone(light, direction);
     if (light.profile) factor *= light.profile->shareTowards(light.profile_from_world * -direction);

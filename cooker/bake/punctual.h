@@ -10,6 +10,9 @@
 
 namespace dimmer::cook {
 
+// Nearer than this a lamp shines as from there: it is no point.
+inline constexpr float lamp_distance_min_m = 0.01f;
+
 struct Illumination {
     glm::vec3 towards_light{0};   // unit
     float distance_m = 0;         // infinite for a directional light

@@ -29,7 +29,8 @@ void move(ReceiverLight& texel, const Step& step) {
     texel.light.tilted_lux = glm::max(texel.light.tilted_lux, 0.0f);
 }
 
-// Receivers that lie so many blocks before one that they are shown beside: over a seam, padding shows any place.
+// Receivers that lie so many blocks before one that they are shown beside: neighbours may be far from each other on the
+// curve that receivers stand along, and over a seam padding shows any place.
 struct FarBehind {
     uint32_t near_blocks;
     bool operator()(size_t receiver, size_t reader) const {

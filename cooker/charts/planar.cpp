@@ -29,6 +29,8 @@ constexpr float waste_max = 1.3f;
 constexpr float waste_free_texels = 16;
 // Within one plane, as planeKey() tells them apart, and the normals of its faces: by how much heights over it differ.
 constexpr float height_slack_m = 0.02f, height_slack_per_m = 1.0f / 256;
+// From the edge of a face towards its middle, where lines to other faces begin.
+constexpr float step_in = 0.01f;
 // Rays are as exact as coordinates: 8e-6 m at 100 m.
 constexpr float ray_slack_m = 1e-4f, ray_slack_per_m = 1e-6f;
 // With more than so many things around a face each line between points is asked for.
@@ -300,8 +302,13 @@ class PlaneGrouper {
         std::vector<uint32_t> root(ids_.size());
         for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = find(i);
         std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
+        if (ids_.size() < 2) return false;
+        glm::vec2 largest_m(0);
+        for (uint32_t i = 0; i < ids_.size(); ++i) largest_m = glm::max(largest_m, rectOf(i).max - rectOf(i).min);
+        // Lines begin so far from where faces end.
+        const float look_m = reach + step_in * std::max(largest_m.x, largest_m.y);
         tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
-            const Walls walls{standing.blocked, standing.triangles ? shadowsNear(a, reach, standing) : std::nullopt};
+            const Walls walls{standing.blocked, standing.triangles ? shadowsNear(a, look_m, standing) : std::nullopt};
             if (walls.shadows && walls.shadows->empty()) return;
             for (const uint32_t b : boxes_.touching(boxOf(a, reach + touching_m)))
                 if (a < b && root[a] == root[b] && near(a, b, reach) && walls.mayPart(rectOf(a), rectOf(b)) &&
@@ -398,8 +405,8 @@ class PlaneGrouper {
                 if (distance < touching_m || distance > reach) continue;
                 // Step off the edges, on which the wall itself may stand.
                 const glm::vec3 middle_b = (fb.corners_m[0] + fb.corners_m[1] + fb.corners_m[2]) / 3.0f;
-                p += 0.01f * (middle - p);
-                q += 0.01f * (middle_b - q);
+                p += step_in * (middle - p);
+                q += step_in * (middle_b - q);
                 const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
                 if (!walls.mayPart({on_p, on_p}, {on_q, on_q})) continue;
                 if (wallAt(p, q, wall_probe_low_m) && wallAt(p, q, wall_probe_high_m)) return true;

@@ -2,6 +2,7 @@
 #include <bake/baked_scene.h>
 #include <bake/test_scenes.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace dimmer::cook::test {
@@ -89,6 +90,46 @@ TEST(NearLamps, NoMoreArrivesThanIsSent) {
             EXPECT_NEAR(found_lm / sent_lm, 1, 0.01)
                 << f.half_m << " m, " << f.parts << " parts, lamp " << height << " over " << f.foot.x;
         }
+}
+
+// Where a lamp is nearer to a point than a lamp can be (punctual.h), that point neither rules the texel nor is lost.
+TEST(NearLamps, MayBeMillimetresOverAPoint) {
+    Scene scene;
+    addFloor(scene, 1, addMaterial(scene, lambert(0)));
+    const glm::vec3 point = BakedScene(scene).position(27, 2);
+    for (const float height : {0.001f, 0.002f, 0.005f, 0.02f}) {
+        scene.lights.clear();
+        addPointLight(scene, {point.x, height, point.z}, lamp_cd, BakeMode::Full);
+        BakedScene b(scene);
+        b.bake({.final_rays = 32});
+        const glm::dvec2 low = glm::floor(4.0 * glm::dvec2(point.x, point.z)) / 4.0;
+        const double expected =
+            lamp_cd * solidAngleOfRectangle(scene.lights[0].position_m, low, low + 0.25) / (0.25 * 0.25);
+        EXPECT_NEAR(static_cast<double>(b.lux(27).y) / expected, 1, 1e-3) << height;
+    }
+}
+
+// Lamps whose light does not come to the texel below them bring it none: one behind a plate, one that shines up.
+TEST(NearLamps, BringNothingWhereNothingArrives) {
+    for (const bool plate : {true, false}) {
+        Scene scene;
+        const uint32_t dark = addMaterial(scene, lambert(0));
+        addFloor(scene, 1, dark);
+        if (plate) addSolid(scene, "plate", {0, 0.05f, 0}, {0.9f, 0.005f, 0.9f}, dark);
+        PunctualLight& lamp = addPointLight(scene, {0.03f, 0.08f, 0.02f}, lamp_cd, BakeMode::Full);
+        if (!plate) {
+            lamp.type = LightType::Spot;
+            lamp.direction = {0, 1, 0};
+            lamp.cone_inner_cos = 0.9f, lamp.cone_outer_cos = 0.8f;
+        }
+        BakedScene b(scene);
+        b.bake({.final_rays = 32});
+        for (size_t i = 0; i < b.texels.size(); ++i) {
+            const glm::vec3 place = glm::abs(b.place(i));
+            if (b.meshOf(i) != "floor" || std::max(place.x, place.z) >= 0.25f) continue;
+            EXPECT_EQ(b.lux(i).y, 0);
+        }
+    }
 }
 
 }  // namespace
