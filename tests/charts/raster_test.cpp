@@ -16,14 +16,14 @@ bool covers(const Triangle& t, uint32_t x, uint32_t y) {
 // Any, needles, and such with corners on the grid.
 TEST(Raster, CellsNearATriangleAreAllThatItCovers) {
     std::mt19937 random(1);
-    constexpr uint32_t side = 64;
-    std::uniform_real_distribution<float> place(0, side), near(-0.3f, 0.3f);
     for (int i = 0; i < 300; ++i) {
+        const uint32_t side = i < 15 ? 256 : 64;
+        std::uniform_real_distribution<float> place(0, static_cast<float>(side)), near(-0.3f, 0.3f);
         Triangle t;
         for (glm::vec2& p : t) p = {place(random), place(random)};
-        if (i % 3 == 1) t[2] = glm::clamp(t[1] + glm::vec2(near(random), near(random)), 0.0f, float{side});
+        if (i % 3 == 1) t[2] = glm::clamp(t[1] + glm::vec2(near(random), near(random)), 0.0f, static_cast<float>(side));
         if (i % 3 == 2)
-            for (glm::vec2& p : t) p = glm::floor(p / 4.0f) * 4.0f;
+            for (glm::vec2& p : t) p = glm::floor(p / 16.0f) * 16.0f;
         std::vector<uint8_t> visited(size_t{side} * side);
         forEachCellNear(t, glm::uvec2(side), [&](uint32_t x, uint32_t y) { ++visited[y * side + x]; });
         for (uint32_t y = 0; y < side; ++y)
