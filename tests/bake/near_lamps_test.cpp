@@ -132,5 +132,28 @@ TEST(NearLamps, BringNothingWhereNothingArrives) {
     }
 }
 
+// A plate whose edge is below the lamp keeps all light from one side of the line under it, which runs through texels.
+// Of those, 64 points tell the share that is lit to 1 / 32 (Halton's first axis has one in each 64th); they get less
+// than half of the light.
+TEST(NearLamps, HalfBehindAPlateBringHalf) {
+    constexpr float foot_x = 0.06f, half_m = 1;
+    for (const float height : {0.05f, 0.1f, 0.3f}) {
+        Scene scene;
+        const uint32_t dark = addMaterial(scene, lambert(0));
+        addFloor(scene, half_m, dark);
+        addSolid(scene, "plate", {foot_x + 2, height / 2, 0}, {2, 1e-4f, 2}, dark);
+        addPointLight(scene, {foot_x, height, -0.04f}, lamp_cd, BakeMode::Full);
+        BakedScene b(scene, 4, 64);
+        b.bake({.final_rays = 32});
+        double found_lm = 0;
+        for (size_t i = 0; i < b.texels.size(); ++i)
+            if (b.meshOf(i) == "floor")
+                found_lm += static_cast<double>(b.lux(i).y) * static_cast<double>(b.texels.area_m2[i]);
+        const glm::dvec3 lamp(scene.lights[0].position_m);
+        const double sent_lm = lamp_cd * solidAngleOfRectangle(lamp, glm::dvec2(-half_m), {lamp.x, half_m});
+        EXPECT_NEAR(found_lm / sent_lm, 1, 1.0 / 32) << height;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test
