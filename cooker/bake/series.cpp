@@ -10,6 +10,7 @@
 
 #include <atomic>
 #include <bit>
+#include <cfloat>
 #include <cmath>
 #include <utility>
 
@@ -256,52 +257,94 @@ class Expansion {
         }
     }
 
-    // Of one light group, over places that count alike: what lies in a dim room as well as what the sun lights.
+    // Of one light group, over places that count alike: what lies in a dim room as well as what the sun lights. Each
+    // channel by itself: what red walls do to a light dies down later than what they do to the blue in it.
     struct Flux {
         // Shares of what is there, m2: bounced so far; what the last round changed, either way.
-        double sum = 0, step = 0;
-        double ratio = 1;  // of the last two steps
-        double ratio_at_leap = 0;
+        glm::dvec3 sum{0}, step{0};
+        glm::dvec3 ratio{1};  // of the last two steps
+        glm::dvec3 ratio_at_leap{0};
+        glm::vec3 floor_lux{0};
+
+        glm::dvec3 shrinks() const { return glm::max(ratio, ratio_at_leap); }
+        // Whether less than a share of the light, in its strongest channel, is still to come in any.
+        bool ends(float tail_max) const {
+            const glm::dvec3 q = shrinks();
+            const double most = static_cast<double>(tail_max) * std::max({sum.x, sum.y, sum.z});
+            for (int c = 0; c < 3; ++c)
+                if (step[c] > 0 && !(q[c] < 1 && step[c] * q[c] / (1 - q[c]) < most)) return false;
+            return true;
+        }
+        // What is still to come of the last step, in steps.
+        glm::vec3 toCome() const {
+            glm::vec3 steps(0);
+            for (int c = 0; c < 3; ++c)
+                if (const double q = ratio_at_leap[c]; q < 1) steps[c] = static_cast<float>(q / (1 - q));
+            return steps;
+        }
     };
 
+    // Light of each group at a receiver, added to `there`; and taken away again.
+    void addUp(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
+        for (const TermLight& l : row) there[paths_.group(l.term)] += l.value();
+    }
+    void clear(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
+        for (const TermLight& l : row) there[paths_.group(l.term)] = glm::vec3(0);
+    }
+
     void measure(const SparseLight& before, std::vector<Flux>& groups) const {
-        // Of each group the area that has light, then the light, and later the step.
+        // Of each group the area that has light, then the light.
         const size_t count = groups.size();
         const Sums all = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
-            std::vector<float> there(count);  // of each group
+            std::vector<glm::vec3> there(count);  // of each group
             for (size_t i = begin; i < end; ++i) {
-                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value());
+                addUp(out_.bounced.row(i), there);
                 for (const TermLight& l : out_.bounced.row(i)) {
                     const size_t group = paths_.group(l.term);
-                    const float lux = std::exchange(there[group], 0.0f);
+                    const float lux = luminance(std::exchange(there[group], glm::vec3(0)));
                     if (!(lux > 0)) continue;
                     sum.of[2 * group] += static_cast<double>(gatherer_.areaM2(i));
                     sum.of[2 * group + 1] += static_cast<double>(gatherer_.areaM2(i) * lux);
                 }
             }
         });
-        std::vector<float> floor_lux;
         for (size_t g = 0; g < count; ++g)
-            floor_lux.push_back(dim_share * static_cast<float>(all.of[2 * g + 1] / std::max(all.of[2 * g], 1e-30)));
-        const Sums now = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
-            std::vector<float> there(count);  // of each group
+            groups[g].floor_lux =
+                glm::vec3(dim_share * static_cast<float>(all.of[2 * g + 1] / std::max(all.of[2 * g], 1e-30)) + FLT_MIN);
+        // Of each group and channel the light and the step, as shares of what is there; and the step as a share of what
+        // was there when the step before was measured, so that light which grows does not make its steps look smaller.
+        constexpr size_t numbers = 9;
+        const Sums now = sumOverRows(receivers_, Sums(numbers * count), [&](size_t begin, size_t end, Sums& sum) {
+            std::vector<glm::vec3> there(count), there_before(count);  // of each group
             for (size_t i = begin; i < end; ++i) {
-                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] += luminance(l.value());
+                addUp(out_.bounced.row(i), there);
+                addUp(before.row(i), there_before);
                 forEachStep(before, out_.bounced, i, i + 1, [&](size_t, const TermLight& l, glm::vec3 old) {
                     const size_t group = paths_.group(l.term);
-                    const float share = gatherer_.areaM2(i) / std::max(there[group] + floor_lux[group], 1e-30f);
-                    sum.of[2 * group] += static_cast<double>(share * luminance(l.value()));
-                    sum.of[2 * group + 1] += static_cast<double>(share * std::abs(luminance(l.value() - old)));
+                    const glm::vec3 is = there[group] + groups[group].floor_lux;
+                    // Where there was none, a step is no more than twice what is there.
+                    const glm::vec3 was = glm::max(there_before[group] + groups[group].floor_lux, 0.5f * is);
+                    const glm::vec3 step = glm::abs(l.value() - old);
+                    const float area = gatherer_.areaM2(i);
+                    for (int c = 0; c < 3; ++c) {
+                        double* const of = &sum.of[numbers * group + 3 * static_cast<size_t>(c)];
+                        of[0] += static_cast<double>(area * l.value()[c] / is[c]);
+                        of[1] += static_cast<double>(area * step[c] / is[c]);
+                        of[2] += static_cast<double>(area * step[c] / was[c]);
+                    }
                 });
-                for (const TermLight& l : out_.bounced.row(i)) there[paths_.group(l.term)] = 0;
+                clear(out_.bounced.row(i), there);
+                clear(before.row(i), there_before);
             }
         });
         for (size_t g = 0; g < count; ++g) {
             if (!running_[g]) continue;
-            const double step = now.of[2 * g + 1];
-            groups[g].ratio = groups[g].step > 0 ? step / groups[g].step : 1;
-            groups[g].sum = now.of[2 * g];
-            groups[g].step = step;
+            for (int c = 0; c < 3; ++c) {
+                const double* const of = &now.of[numbers * g + 3 * static_cast<size_t>(c)];
+                groups[g].ratio[c] = groups[g].step[c] > 0 ? of[2] / groups[g].step[c] : 1;
+                groups[g].sum[c] = of[0];
+                groups[g].step[c] = of[1];
+            }
         }
     }
 
@@ -316,9 +359,8 @@ class Expansion {
             };
             forEachStep(before, out_.bounced, begin, end, [&](size_t i, const TermLight& l, glm::vec3 old) {
                 emitUpTo(i);
-                const double q = runs(l.term) ? groups[paths_.terms()[l.term].group].ratio_at_leap : 0;
-                row.emplace_back(l.term, l.value() + static_cast<float>(q / (1 - q)) * (l.value() - old),
-                                 Rounding(i, Rounding::Of::Foreseen));
+                const glm::vec3 steps = runs(l.term) ? groups[paths_.group(l.term)].toCome() : glm::vec3(0);
+                row.emplace_back(l.term, l.value() + steps * (l.value() - old), Rounding(i, Rounding::Of::Foreseen));
             });
             emitUpTo(end);
         });
@@ -344,15 +386,14 @@ class Expansion {
             for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
                 if (!running_[g]) continue;
                 Flux& group = groups[g];
-                const double q = std::max(group.ratio, group.ratio_at_leap);
-                if (!(group.step > 0) || (q < 1 && group.step * q / (1 - q) < settings_.tail_max * group.sum)) {
+                if (group.ends(settings_.tail_max)) {
                     running_[g] = 0;
                     continue;
                 }
                 ++out_.bounces[g];
-                if (n + 1 != rounds_before_leap || !(q < 1)) continue;
-                group.ratio_at_leap = q;
-                any_leaps = true;
+                if (n + 1 != rounds_before_leap) continue;
+                for (int c = 0; c < 3; ++c)
+                    if (group.ratio[c] < 1) group.ratio_at_leap[c] = group.ratio[c], any_leaps = true;
             }
             if (any_leaps) out_.bounced = leap(before, groups);
         }

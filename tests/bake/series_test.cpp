@@ -44,6 +44,32 @@ TEST(Series, ADimWhiteRoomBesideABrightDarkOne) {
     }
 }
 
+// In a sphere lit from its centre, what arrives by bounces is direct x rho / (1 - rho), in each channel: blue goes on
+// long after red is gone, and of walls that are nearly white a bounce takes a twentieth.
+TEST(Series, EachChannelIsFollowedToItsEnd) {
+    for (const glm::vec3 rho : {glm::vec3(0.3f, 0.4f, 0.85f), glm::vec3(0.95f)}) {
+        const glm::vec3 candela(1000, 500, 150);
+        Scene scene;
+        Material coloured = lambert(1);
+        coloured.base_color = rho;
+        const double area_m2 = addSphere(scene, 2, 32, 16, addMaterial(scene, coloured));
+        addPointLight(scene, {0, 0, 0}, 1, BakeMode::Indirect).intensity = candela;
+        BakedScene b(scene);
+        b.bake({.series_rays = 128, .final_rays = 256, .tail_max = 0.01f});
+        glm::dvec3 sum(0);
+        double area = 0;
+        for (size_t i = 0; i < b.texels.size(); ++i) {
+            sum += static_cast<double>(b.texels.area_m2[i]) * glm::dvec3(b.lux(i));
+            area += static_cast<double>(b.texels.area_m2[i]);
+        }
+        for (int c = 0; c < 3; ++c) {
+            const double expected = Ball{rho[c], candela[c]}.expectedLux(area_m2);
+            // 1 % may be still to come, and 1 % of rays and facets.
+            EXPECT_NEAR(sum[c] / area, expected, 0.02 * expected) << rho[c];
+        }
+    }
+}
+
 // Always-on light is asked for everywhere; where there is none it costs no rays.
 TEST(Series, ALevelWithoutAlwaysOnLightTracesNoMoreRays) {
     uint64_t rays[2];
