@@ -24,9 +24,10 @@ float shadowEnd(float distance_m) {
 // to load.
 constexpr uint32_t rays_ahead = 8;
 
-// Where the samples of this round begin in the sequence of all rounds: they take turns at the texel's points.
-uint32_t firstSample(const GatherOptions& options) {
-    return options.first_ray / std::max(options.rays, 1u) * options.emitter_samples;
+// Where the samples of this round, so many in each, begin in the sequence of all rounds: they take turns at the texel's
+// points.
+uint32_t firstSample(const GatherOptions& options, uint32_t samples) {
+    return options.first_ray / std::max(options.rays, 1u) * samples;
 }
 
 }  // namespace
@@ -449,29 +450,33 @@ void Gatherer::takeFrom(const Ray<Light>& ray, uint32_t receiver, uint32_t path)
 glm::vec3 Gatherer::missed(const GatherOptions& options, glm::vec3 world, float density) const {
     const glm::vec3 radiance = skyRadiance(rays_.scene(), world);
     if (sky_.empty()) return radiance;
-    const float by_sky = static_cast<float>(options.emitter_samples) * sky_.pdf(radiance);
+    const float by_sky = sky_.density(radiance, options.emitter_samples);
     return radiance * (density / (density + by_sky));
 }
 
 template <class Light>
 void Gatherer::sampleSky(const GatherFrom& from, const GatherOptions& options, TermAccumulator<Light>& sum) const {
     if (!options.wanted_in_group.empty() && options.wanted_in_group[always_group] == 0) return;
-    const uint32_t seed = hash(options.seed ^ 0x3c6ef372u, from.id);
-    for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const uint32_t index = firstSample(options) + i;
-        const SamplePoint& origin = from.points[(index + seed) % from.points.size()];
-        const SkySample s = sky_.sample(sequence2d(index, seed));
-        const glm::vec3 d = toTangent(origin, s.direction);
-        if (!(s.pdf > 0) || !(Light::Intake::weight(d) > 0)) continue;
-        const float by_sky = static_cast<float>(options.emitter_samples) * s.pdf;
-        const float weight = Light::Intake::weight(d);
-        const auto weights = Light::weightsOf(d);
-        forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction, far_away_m,
-                   [&](float passed, uint32_t path) {
-                       const float by_ray = static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
-                       if (const uint32_t term = wantedOf(always_group, path, sum); term != no_term)
-                           sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), weights);
-                   });
+    for (const auto part : {SkySampler::Peaks, SkySampler::Rest}) {
+        const uint32_t seed = hash(options.seed ^ (part == SkySampler::Rest ? 0x3c6ef372u : 0x78dde6e4u), from.id);
+        const uint32_t samples = sky_.samplesOf(part, options.emitter_samples);
+        for (uint32_t i = 0; i < samples; ++i) {
+            const uint32_t index = firstSample(options, samples) + i;
+            const SamplePoint& origin = from.points[(index + seed) % from.points.size()];
+            const SkySample s = sky_.sample(part, sequence2d(index, seed));
+            const glm::vec3 d = toTangent(origin, s.direction);
+            const float weight = Light::Intake::weight(d),
+                        by_sky = sky_.density(s.radiance_cd_m2, options.emitter_samples);
+            if (!(by_sky > 0) || !(weight > 0)) continue;
+            const auto weights = Light::weightsOf(d);
+            forEachWay(rays_, paths_, from.condition, from.ignored, origin.position_m, s.direction, far_away_m,
+                       [&](float passed, uint32_t path) {
+                           const float by_ray =
+                               static_cast<float>(options.raysOver(path)) * weight / Light::Intake::total;
+                           if (const uint32_t term = wantedOf(always_group, path, sum); term != no_term)
+                               sum[term].add(s.radiance_cd_m2 * (passed * weight / (by_sky + by_ray)), weights);
+                       });
+        }
     }
 }
 
@@ -498,7 +503,7 @@ void Gatherer::sampleEmitters(const GatherFrom& from, const GatherOptions& optio
     const uint32_t rounds_for_all = points / std::gcd(points, options.emitter_samples);
     const uint32_t turn = options.first_ray / std::max(options.rays, 1u) / rounds_for_all;
     for (uint32_t i = 0; i < options.emitter_samples; ++i) {
-        const uint32_t index = firstSample(options) + i;
+        const uint32_t index = firstSample(options, options.emitter_samples) + i;
         const SamplePoint& origin = from.points[(index + any_point) % from.points.size()];
         for (const auto& range : emitters_.groups(emitters_.cellAt(origin.position_m))) {
             if (!options.wanted_in_group.empty() && options.wanted_in_group[range.group] == 0) continue;

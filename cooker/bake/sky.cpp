@@ -4,9 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace dimmer::cook {
 namespace {
+
+// What sends so many times the mean sky's radiance is drawn apart.
+constexpr double peak_over_mean = 16;
+constexpr std::array all_parts = {SkySampler::Rest, SkySampler::Peaks};
+
+// By luminance a blue sun would hardly be asked for.
+float brightest(glm::vec3 radiance) {
+    return std::max({radiance.x, radiance.y, radiance.z});
+}
 
 // Index of the interval of ascending cumulated shares that `u` falls into, and `u` stretched over it.
 struct Drawn {
@@ -51,27 +61,50 @@ glm::vec3 skyRadiance(const Scene& scene, glm::vec3 direction) {
     return glm::vec3(image.texels[i]) * scene.sky_radiance_cd_m2;
 }
 
-SkySampler::SkySampler(const Scene& scene) : scene_(scene) {
+SkySampler::SkySampler(const Scene& scene) : scene_(scene), peaks_above_(std::numeric_limits<float>::max()) {
     if (!scene.sky_image) return;
-    const Image& image = *scene.sky_image;
-    std::vector<double> row_weights(image.height), weights(image.width);
-    column_cdf_.resize(image.texels.size());
-    for (uint32_t row = 0; row < image.height; ++row) {
-        for (uint32_t x = 0; x < image.width; ++x)
-            weights[x] = static_cast<double>(
-                luminance(glm::vec3(image.texels[size_t{row} * image.width + x]) * scene.sky_radiance_cd_m2));
-        row_weights[row] = solidAngle(image, row) * cumulate(weights, &column_cdf_[size_t{row} * image.width]);
-    }
-    std::vector<float> row_cdf(image.height);
-    flux_ = static_cast<float>(cumulate(row_weights, row_cdf.data()));
-    if (flux_ > 0) row_cdf_ = std::move(row_cdf);
+    const Table all = tableOf(Rest);
+    const double mean = static_cast<double>(all.flux) / (4 * std::numbers::pi);
+    peaks_above_ = static_cast<float>(std::min(peak_over_mean * mean, double{std::numeric_limits<float>::max()}));
+    for (const Part part : all_parts) tables_[part] = tableOf(part);
 }
 
-SkySample SkySampler::sample(glm::vec2 u) const {
+SkySampler::Part SkySampler::partOf(glm::vec3 radiance_cd_m2) const {
+    return brightest(radiance_cd_m2) > peaks_above_ ? Peaks : Rest;
+}
+
+SkySampler::Table SkySampler::tableOf(Part part) const {
     const Image& image = *scene_.sky_image;
-    const Drawn row = draw(row_cdf_.data(), image.height, u.x);
+    std::vector<double> row_weights(image.height), weights(image.width);
+    Table table;
+    table.column_cdf.resize(image.texels.size());
+    for (uint32_t row = 0; row < image.height; ++row) {
+        const size_t first = size_t{row} * image.width;
+        for (uint32_t x = 0; x < image.width; ++x) {
+            const glm::vec3 radiance = glm::vec3(image.texels[first + x]) * scene_.sky_radiance_cd_m2;
+            weights[x] = partOf(radiance) == part ? static_cast<double>(brightest(radiance)) : 0;
+        }
+        row_weights[row] = solidAngle(image, row) * cumulate(weights, &table.column_cdf[first]);
+    }
+    table.row_cdf.resize(image.height);
+    table.flux = static_cast<float>(cumulate(row_weights, table.row_cdf.data()));
+    return table.flux > 0 ? table : Table();
+}
+
+uint32_t SkySampler::samplesOf(Part part, uint32_t samples) const {
+    if (samples == 0 || tables_[part].empty()) return 0;
+    const float share = tables_[Peaks].flux / (tables_[Peaks].flux + tables_[Rest].flux);
+    const auto of_peaks = std::max(1u, static_cast<uint32_t>(std::lround(share * static_cast<float>(samples))));
+    if (tables_[Peaks].empty()) return samples;
+    return part == Peaks ? of_peaks : std::max(1u, samples - std::min(of_peaks, samples));
+}
+
+SkySample SkySampler::sample(Part part, glm::vec2 u) const {
+    const Image& image = *scene_.sky_image;
+    const Table& table = tables_[part];
+    const Drawn row = draw(table.row_cdf.data(), image.height, u.x);
     const size_t first = row.index * image.width;
-    const Drawn column = draw(&column_cdf_[first], image.width, u.y);
+    const Drawn column = draw(&table.column_cdf[first], image.width, u.y);
     // Uniform over the texel's solid angle: the height above the equator is.
     const double step = std::numbers::pi / image.height;
     const auto top = static_cast<float>(std::cos(static_cast<double>(row.index) * step));
@@ -79,12 +112,14 @@ SkySample SkySampler::sample(glm::vec2 u) const {
     const float y = glm::mix(top, bottom, row.within), across = std::sqrt(std::max(0.0f, 1 - y * y));
     const float azimuth = (static_cast<float>(column.index) + column.within) / static_cast<float>(image.width) - 0.5f;
     const float phi = 2 * pi * azimuth;
-    const glm::vec3 radiance = glm::vec3(image.texels[first + column.index]) * scene_.sky_radiance_cd_m2;
-    return {{across * std::cos(phi), y, across * std::sin(phi)}, radiance, pdf(radiance)};
+    return {{across * std::cos(phi), y, across * std::sin(phi)},
+            glm::vec3(image.texels[first + column.index]) * scene_.sky_radiance_cd_m2};
 }
 
-float SkySampler::pdf(glm::vec3 radiance_cd_m2) const {
-    return luminance(radiance_cd_m2) / flux_;
+float SkySampler::density(glm::vec3 radiance_cd_m2, uint32_t samples) const {
+    const Part part = partOf(radiance_cd_m2);
+    if (tables_[part].empty()) return 0;
+    return static_cast<float>(samplesOf(part, samples)) * brightest(radiance_cd_m2) / tables_[part].flux;
 }
 
 }  // namespace dimmer::cook

@@ -3,6 +3,7 @@
 
 #include <scene/scene.h>
 
+#include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
 #include <vector>
@@ -16,27 +17,40 @@ glm::vec3 skyRadiance(const Scene& scene, glm::vec3 direction);
 struct SkySample {
     glm::vec3 direction{0};  // unit
     glm::vec3 radiance_cd_m2{0};
-    float pdf = 0;  // per steradian
 };
 
-// Draws directions of an image sky in proportion to its luminance (marginal and conditional tables over rows and
-// columns). A constant sky needs none of this: cosine rays are right for it.
+// Draws directions of an image sky in proportion to its brightest channel (marginal and conditional tables over rows
+// and columns). A constant sky needs none of this: cosine rays are right for it. What outshines the rest, as the sun
+// does, is drawn apart from it, by fixed numbers: else how many of a few samples find the sun is chance, and where all
+// of them do, no spread tells that some should not have.
 class SkySampler {
    public:
+    enum Part : uint8_t { Rest, Peaks };
+
     explicit SkySampler(const Scene& scene);
 
     // Nothing to draw from: no image, or a black one.
-    bool empty() const { return row_cdf_.empty(); }
-    // `u` in [0, 1)^2.
-    SkySample sample(glm::vec2 u) const;
-    // The density with which sample() draws a direction that has this radiance.
-    float pdf(glm::vec3 radiance_cd_m2) const;
+    bool empty() const { return tables_[Rest].empty() && tables_[Peaks].empty(); }
+    // How many of `samples` are drawn of a part: at least one of each that sends light, so that it may be one more.
+    uint32_t samplesOf(Part part, uint32_t samples) const;
+    // Of a part that has samples; `u` in [0, 1)^2.
+    SkySample sample(Part part, glm::vec2 u) const;
+    // How many of `samples` are drawn per steradian in a direction that has this radiance.
+    float density(glm::vec3 radiance_cd_m2, uint32_t samples) const;
 
    private:
+    struct Table {
+        std::vector<float> row_cdf;     // up to and including each row; the last is 1
+        std::vector<float> column_cdf;  // the same within each row
+        float flux = 0;                 // integral of the brightest channel over the part's directions, cd/m2 sr
+        bool empty() const { return row_cdf.empty(); }
+    };
+    Part partOf(glm::vec3 radiance_cd_m2) const;
+    Table tableOf(Part part) const;
+
     const Scene& scene_;
-    std::vector<float> row_cdf_;     // up to and including each row; the last is 1
-    std::vector<float> column_cdf_;  // the same within each row
-    float flux_ = 0;                 // integral of luminance over all directions, cd/m2 sr
+    float peaks_above_;  // cd/m2, of the brightest channel
+    std::array<Table, 2> tables_;
 };
 
 }  // namespace dimmer::cook
