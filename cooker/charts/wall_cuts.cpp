@@ -22,6 +22,7 @@ constexpr float reach_texels = 2.5f;     // thinner than this leaks: bilinear fi
 constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
 constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
 constexpr float margin_m = 5e-3f;  // a cut this close to a rectangle's edge parts nothing, nor one within its rounding
+constexpr float facing_cos = 0.99f, facing_share = 0.5f, probe_share_of_room = 0.9f;
 constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
@@ -156,7 +157,7 @@ class WallCutter {
     std::vector<Cut> findCuts(const PlanarChart& chart) const {
         const float reach_m = reach_texels / chart.texels_per_metre;
         const std::vector<Trace> traces =
-            standing(findTraces(chart, wall_probe_low_m), findTraces(chart, wall_probe_high_m));
+            standing(findTraces(chart, wall_probe_low_m), findTraces(chart, highProbe(chart)));
         std::vector<Cut> cuts;
         for (const Trace& a : traces) {
             if (a.forward) continue;
@@ -168,6 +169,38 @@ class WallCutter {
             }
         }
         return joinCuts(std::move(cuts));
+    }
+
+    // A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
+    // other, and is no higher over either. So below what faces half of the chart, where that is near.
+    float highProbe(const PlanarChart& chart) const {
+        const PlanarFace& any = faces_[chart.faces[0]];
+        const float plane = glm::dot(any.normal, any.corners_m[0]);
+        BoxTree::Box box = boxOver(chart, any.normal, plane);
+        const BoxTree::Box above = boxOver(chart, any.normal, plane + wall_probe_high_m);
+        box.min_m = glm::min(box.min_m, above.min_m), box.max_m = glm::max(box.max_m, above.max_m);
+        std::vector<std::pair<float, float>> facing;  // height, area over the chart's rectangle
+        for (const uint32_t near : blocking_boxes_.touching(box)) {
+            const PlanarFace& face = faces_[blocking_[near]];
+            const float height = glm::dot(any.normal, face.corners_m[0]) - plane;
+            if (glm::dot(any.normal, face.normal) > -facing_cos || height < wall_probe_low_m ||
+                height > wall_probe_high_m)
+                continue;
+            std::vector<glm::vec2> over;
+            for (const glm::vec3 p : face.corners_m)
+                over.emplace_back(glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis));
+            for (int axis = 0; axis < 2; ++axis) {
+                over = clip(over, {axis, chart.min_m[axis], 0, 0}, 1);
+                over = clip(over, {axis, chart.min_m[axis] + chart.size_m[axis], 0, 0}, -1);
+            }
+            facing.emplace_back(height, area(over));
+        }
+        std::ranges::sort(facing);
+        float covered = 0;
+        for (const auto& [height, area_m2] : facing)
+            if ((covered += area_m2) >= facing_share * chart.size_m.x * chart.size_m.y)
+                return std::max(probe_share_of_room * height, 2 * wall_probe_low_m);
+        return wall_probe_high_m;
     }
 
     static std::tuple<int, bool, float> placeOf(const Trace& t) { return {t.axis, t.forward, t.at}; }
