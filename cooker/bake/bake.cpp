@@ -166,7 +166,10 @@ class Bake {
                 for (const ProbeTermLight& l : probes->row(i)) ++baked_.reports[l.term].receivers;
         baked_.dependent_doors = dependentDoors(baked_.door_flux, settings_);
         if (baked_.bounces == settings_.bounces_max)
-            baked_.warnings.push_back("the bounces had not died down at bounces_max; some light is missing");
+            baked_.warnings.push_back(
+                "the bounces had not died down when there had been as many as the quality's 'bounces' allow; some "
+                "light is "
+                "missing (walls that reflect nearly all of it make it last)");
         return std::move(baked_);
     }
 

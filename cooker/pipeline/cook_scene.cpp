@@ -57,6 +57,7 @@ void warnOfPlaces(const ChartedLevel& level, CookStats& stats) {
     const auto buried = warningsOfBuriedLights(*level.rays);
     stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
     if (auto warning = farFromOrigin(*level.rays)) stats.warnings.push_back(std::move(*warning));
+    if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));

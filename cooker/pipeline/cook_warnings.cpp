@@ -38,6 +38,17 @@ std::optional<std::string> farFromOrigin(const RayScene& rays) {
         rays.scene().file, most_m, far_m);
 }
 
+std::optional<std::string> withoutLight(const Scene& scene) {
+    const auto glows = [](const Material& m) { return m.emission_cd_m2 != glm::vec3(0); };
+    if (!scene.lights.empty() || scene.sky_radiance_cd_m2 != glm::vec3(0) ||
+        std::ranges::any_of(scene.materials, glows))
+        return {};
+    return scene.file +
+           ": has no light, and all of it comes out black; export it with punctual lights, or give it a sky or a "
+           "material "
+           "that shines";
+}
+
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {
     std::vector<std::string> warnings;
     for (const auto& [key, origin] : profile.origin)

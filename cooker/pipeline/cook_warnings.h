@@ -19,6 +19,9 @@ std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
 // lit from behind themselves.
 std::optional<std::string> farFromOrigin(const RayScene& rays);
 
+// No lamp, no sky, nothing that shines: an exporter's lights are easily left out.
+std::optional<std::string> withoutLight(const Scene& scene);
+
 // Of the command line's settings for another quality, which do nothing.
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);
 

@@ -3,6 +3,7 @@
 #include <pipeline/charted_level.h>
 #include <scene/gltf_file.h>
 #include <scene/node_walk.h>
+#include <scene/uri.h>
 #include <write/gltf_prune.h>
 #include <write/pack_writer.h>
 
@@ -300,19 +301,18 @@ class LevelWriter {
         // A file that is a link itself is read from two folders.
         const bool by_two_names = realFolderOf(to) != new_folder;
         if (old_folder == new_folder && !by_two_names) return;
-        const auto move = [&](Json& uri) {
-            const std::string text = uri.get<std::string>();
-            if (text.starts_with("data:")) return;
-            const auto file = old_folder / text, seen = file.lexically_relative(new_folder);
-            uri = (seen.empty() || by_two_names ? file : seen).generic_string();
+        const auto moved = [&](const std::string& path) {
+            const auto file = old_folder / path, seen = file.lexically_relative(new_folder);
+            return (seen.empty() || by_two_names ? file : seen).generic_string();
         };
         Json& d = document_.json;
         const Json::json_pointer sky("/scenes/" + std::to_string(d.value("scene", 0)) + "/extras/dimmer_sky_image");
-        if (d.contains(sky)) move(d[sky]);
+        if (d.contains(sky)) d[sky] = moved(d[sky].get<std::string>());
         const Json::json_pointer ies("/extensions/EXT_lights_ies/lights");
         if (d.contains(ies))
             for (Json& light : d[ies])
-                if (light.contains("uri")) move(light["uri"]);
+                if (const std::string uri = light.value("uri", "data:"); !uri.starts_with("data:"))
+                    light["uri"] = percentEncoded(moved(percentDecoded(uri)));
     }
 
     const ChartedLevel& level_;

@@ -75,6 +75,12 @@ class Checker {
             const tinygltf::BufferView& view = model_.bufferViews[i];
             const std::string owner = fmt::format("buffer view {}", i);
             if (const auto ok = index(view.buffer, model_.buffers, owner, "buffer"); !ok) return ok;
+            // The parser takes a GLB's chunk for any buffer without one; it is the first buffer's alone
+            // (glTF 2.0, 3.6.1.2).
+            if (view.buffer > 0 && model_.buffers[static_cast<size_t>(view.buffer)].uri.empty())
+                return context_.error(owner, fmt::format("is of buffer {}, which has no uri: its bytes are nowhere. "
+                                                         "Export the level again, without mesh compression.",
+                                                         view.buffer));
             const size_t size = model_.buffers[static_cast<size_t>(view.buffer)].data.size();
             if (view.byteOffset > size || view.byteLength > size - view.byteOffset)
                 return context_.error(

@@ -20,6 +20,21 @@ std::string percentDecoded(const std::string& uri) {
     return path;
 }
 
+std::string percentEncoded(const std::string& path) {
+    constexpr std::string_view plain =
+                                   "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/!$&'()*+,;=:@",
+                               digits = "0123456789ABCDEF";
+    std::string uri;
+    for (const char c : path) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (plain.contains(c))
+            uri += c;
+        else
+            uri += {'%', digits[byte >> 4], digits[byte & 15]};
+    }
+    return uri;
+}
+
 bool decodeDataUri(const std::string& uri, std::vector<unsigned char>& bytes) {
     constexpr std::string_view marker = ";base64,";
     const size_t at = uri.find(marker);

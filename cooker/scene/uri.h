@@ -9,6 +9,9 @@ namespace dimmer::cook {
 // RFC 3986, 2.1. What is no escape stays as it is.
 std::string percentDecoded(const std::string& uri);
 
+// The other way round, of a path: what a URI's path must not hold as it is.
+std::string percentEncoded(const std::string& path);
+
 // What a base64 data URI of whatever media type holds; false for others, and for none. The parser decodes those types
 // alone that it knows.
 bool decodeDataUri(const std::string& uri, std::vector<unsigned char>& bytes);

@@ -396,6 +396,19 @@ TEST(CoarseExposure, NamesTheSetThatAsksForIt) {
     EXPECT_THAT(*coarseExposure(scene, 0x1p-30f), HasSubstr("intensity"));
 }
 
+TEST(WithoutLight, IsSaidOfLevelsThatStayBlack) {
+    Scene scene;
+    scene.file = "level.glb";
+    scene.materials.resize(1);
+    ASSERT_TRUE(withoutLight(scene));
+    EXPECT_THAT(*withoutLight(scene), testing::AllOf(HasSubstr("level.glb: "), HasSubstr("no light")));
+    Scene lamp = scene, sky = scene, panel = scene;
+    lamp.lights.emplace_back();
+    sky.sky_radiance_cd_m2 = {0, 0, 1};
+    panel.materials[0].emission_cd_m2 = {1, 0, 0};
+    for (const Scene& lit : {lamp, sky, panel}) EXPECT_FALSE(withoutLight(lit));
+}
+
 TEST(FarFromOrigin, IsSaidOfLevelsFarOff) {
     for (const float at_m : {0.0f, 1500.0f, -5000.0f}) {
         Scene scene;

@@ -11,14 +11,44 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The key of a GLB file's first scene.
-std::string skyNamedBy(const fs::path& glb) {
+json documentOf(const fs::path& glb) {
     std::ifstream in(glb, std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(in), {}};
     uint32_t length = 0;  // of the JSON, behind the file's header of 12 bytes
-    if (bytes.size() < 20) return "";
+    if (bytes.size() < 20) return {};
     std::memcpy(&length, bytes.data() + 12, sizeof(length));
-    return json::parse(bytes.substr(20, length))["scenes"][0]["extras"].value("dimmer_sky_image", "");
+    return json::parse(bytes.substr(20, length));
+}
+
+// The key of a GLB file's first scene.
+std::string skyNamedBy(const fs::path& glb) {
+    json document = documentOf(glb);
+    return document["scenes"][0]["extras"].value("dimmer_sky_image", "");
+}
+
+// A photometric file is named by a URI, whose escapes a folder's name may look like.
+TEST(WriteLevelPaths, FoldersThatLookLikeEscapesNameTheSameProfile) {
+    const TemporaryFolder folder;
+    for (const char* name : {"50%41", "out"}) fs::create_directory(folder.path / name);
+    writeText(folder, "50%41/l amp.ies",
+              "IESNA:LM-63-2002\nTILT=NONE\n1 1000 1 2 1 1 2 0 0 0\n1 1 0\n0 90\n0\n100 100\n");
+    LevelFile level = twoCells();
+    level.document["extensionsUsed"].push_back("EXT_lights_ies");
+    level.document["extensions"]["EXT_lights_ies"]["lights"] = json::array({{{"uri", "l%20amp.ies"}}});
+    level.addNode({{"name", "spot"}, {"extensions", {{"EXT_lights_ies", {{"light", 0}}}}}});
+    const auto source = writeLevel(folder, level, "50%41/level.gltf");
+    const auto profile = writeText(folder, "quick.json", R"({"bake": {"draft": {"samples_per_texel": 1,
+        "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
+    SilentProgress silent;
+    const auto cooked = cook(
+        {.level = source, .pack = folder.path / "a.dimmer", .profile = profile.string(), .quality = "draft"}, silent);
+    ASSERT_TRUE(cooked.has_value()) << cooked.error().message;
+    std::vector<std::string> warnings;
+    const auto written = folder.path / "out/level.glb";
+    ASSERT_TRUE(cook::writeLevel(source, cooked->pack, written, warnings));
+    json document = documentOf(written);
+    EXPECT_EQ(document["extensions"]["EXT_lights_ies"]["lights"][0]["uri"], "../50%2541/l%20amp.ies");
+    EXPECT_TRUE(importLevel(written));
 }
 
 TEST(WriteLevelPaths, ThroughLinksAndDotsNameTheSameSky) {

@@ -461,6 +461,17 @@ TEST(SceneBadInput, ChunksOfAGlbThatSayNothingArePassedOver) {
     }
 }
 
+// A GLB's chunk is its first buffer's. Read as another one's as well it was geometry of the wrong bytes.
+TEST(SceneBadInput, ASecondBufferWithoutUriIsNowhere) {
+    LevelFile level = LevelFile::withFloor();
+    json uri = json::parse(level.gltfText())["buffers"][0];
+    for (json& view : level.document["bufferViews"]) view["buffer"] = 1;
+    level.document["buffers"] = json::array({{{"byteLength", level.buffer.size()}}, uri});
+    ASSERT_IMPORTED(importBytes("level.glb", level.glb()));
+    level.document["buffers"][1].erase("uri");
+    expectBadInput(importBytes("level.glb", level.glb()), {"buffer view 0", "buffer 1", "no uri"});
+}
+
 // Found by fuzzing: where the header counts nothing, no chunk was checked, and the JSON's length was believed.
 TEST(SceneBadInput, AGlbThatCountsLessThanItsFirstChunk) {
     for (const uint8_t length : {0, 12, 19}) {
