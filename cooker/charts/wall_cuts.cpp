@@ -22,7 +22,8 @@ constexpr float reach_texels = 2.5f;     // thinner than this leaks: bilinear fi
 constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
 constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
 constexpr float margin_m = 5e-3f;  // a cut this close to a rectangle's edge parts nothing, nor one within its rounding
-constexpr float facing_cos = 0.99f, facing_share = 0.5f, probe_share_of_room = 0.9f;
+constexpr float doorway_min_m = 0.5f;  // narrower ones are gaps between a shelf's boards
+constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0.9f;
 constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
 
 // The trace of a blocking triangle on a plane: an interval of a line x = at (axis 0) or y = at (axis 1).
@@ -172,9 +173,10 @@ class WallCutter {
     }
 
     // A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
-    // other, and is no higher over either. So below what faces half of the chart, where that is near.
+    // other, and is no higher over either. So below what faces nearly all of the chart, where that is near.
     float highProbe(const PlanarChart& chart) const {
         const PlanarFace& any = faces_[chart.faces[0]];
+        if (any.group != 0) return wall_probe_high_m;  // of a door's leaf
         const float plane = glm::dot(any.normal, any.corners_m[0]);
         BoxTree::Box box = boxOver(chart, any.normal, plane);
         const BoxTree::Box above = boxOver(chart, any.normal, plane + wall_probe_high_m);
@@ -183,7 +185,8 @@ class WallCutter {
         for (const uint32_t near : blocking_boxes_.touching(box)) {
             const PlanarFace& face = faces_[blocking_[near]];
             const float height = glm::dot(any.normal, face.corners_m[0]) - plane;
-            if (glm::dot(any.normal, face.normal) > -facing_cos || height < wall_probe_low_m ||
+            const bool moves = face.group != 0;
+            if (moves || glm::dot(any.normal, face.normal) > -facing_cos || height < doorway_min_m ||
                 height > wall_probe_high_m)
                 continue;
             std::vector<glm::vec2> over;
@@ -199,7 +202,7 @@ class WallCutter {
         float covered = 0;
         for (const auto& [height, area_m2] : facing)
             if ((covered += area_m2) >= facing_share * chart.size_m.x * chart.size_m.y)
-                return std::max(probe_share_of_room * height, 2 * wall_probe_low_m);
+                return probe_share_of_room * height;
         return wall_probe_high_m;
     }
 

@@ -4,6 +4,8 @@
 #include <scene/uri.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cstring>
 #include <fstream>
 #include <limits>
@@ -100,6 +102,35 @@ size_t deepestNesting(std::string_view json) {
         }
     }
     return deepest;
+}
+
+// What a bake does not ask for, and the parser refuses in forms that glTF allows: skins without inverse bind matrices,
+// animations of what is no node. It passes over members that it does not know, so these get names of the same length.
+void hideFromParser(std::span<unsigned char> json) {
+    constexpr std::array<std::string_view, 2> hidden = {"animations", "skins"};
+    size_t depth = 0, string_begin = 0;
+    bool in_string = false;
+    for (size_t i = 0; i < json.size(); ++i) {
+        const unsigned char c = json[i];
+        if (in_string) {
+            if (c == '\\') ++i;
+            if (c != '"') continue;
+            in_string = false;
+            const auto text = json.subspan(string_begin, i - string_begin);
+            size_t after = i + 1;
+            while (after < json.size() && std::isspace(json[after])) ++after;
+            if (depth != 1 || after == json.size() || json[after] != ':') continue;
+            for (const std::string_view name : hidden)
+                if (std::ranges::equal(text, name)) text.back() = '_';
+        } else if (c == '"') {
+            in_string = true;
+            string_begin = i + 1;
+        } else if (c == '{' || c == '[') {
+            ++depth;
+        } else if ((c == '}' || c == ']') && depth > 0) {
+            --depth;
+        }
+    }
 }
 
 // Files that the level names.
@@ -257,6 +288,7 @@ Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
     const std::string folder = std::filesystem::absolute(path).parent_path().string();
     try {
         if (auto ok = checkTypes(json, file); !ok) return std::unexpected(ok.error());
+        hideFromParser(std::span(*bytes).subspan(glb ? header_bytes + chunk_header_bytes : 0, json.size()));
         Expected<tinygltf::Model> model = parse(*bytes, glb, externalFiles(json, folder), file);
         if (model && !model->asset.version.starts_with("2"))
             return fail(ErrorCode::BadInput,

@@ -461,6 +461,22 @@ TEST(SceneBadInput, ChunksOfAGlbThatSayNothingArePassedOver) {
     }
 }
 
+// Skins and animations say nothing to a bake; forms of them that glTF allows are no fault of a level.
+TEST(SceneBadInput, SkinsAndAnimationsAreNotAskedFor) {
+    LevelFile level = LevelFile::withFloor();
+    level.document["skins"] = json::array({{{"joints", {0}}}});
+    level.document["animations"] = json::array(
+        {{{"samplers", json::array({{{"input", 0}, {"output", 0}}})},
+          {"channels",
+           json::array({{{"sampler", 0},
+                         {"target",
+                          {{"path", "pointer"},
+                           {"extensions", {{"KHR_animation_pointer", {{"pointer", "/materials/0"}}}}}}}}})}}});
+    level.node(0)["extras"] = {{"skins", 1}, {"animations", "\"skins\": {"}};  // no members of the document
+    ASSERT_IMPORTED(level.import());
+    ASSERT_IMPORTED(importBytes("level.glb", level.glb()));
+}
+
 // A GLB's chunk is its first buffer's. Read as another one's as well it was geometry of the wrong bytes.
 TEST(SceneBadInput, ASecondBufferWithoutUriIsNowhere) {
     LevelFile level = LevelFile::withFloor();
