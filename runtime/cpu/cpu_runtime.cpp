@@ -97,7 +97,8 @@ void blendProbes(std::span<const WorkItem> items, const WorkList& work, const Pa
 
 CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads, uint32_t moving_probes_max)
     : LightState(pack, 1, moving_probes_max) {
-    if (threads > 1) pool_ = std::make_unique<WorkerPool>(threads);
+    constexpr uint32_t threads_max = 1024;  // hardware_concurrency() - 1 may be 4 billion, where that says 0
+    if (threads > 1) pool_ = std::make_unique<WorkerPool>(std::min(threads, threads_max));
     const PackData& data = pack.data();
     irradiance_.resize(data.base_pages.size());
     direction_.resize(data.base_pages.size());

@@ -294,12 +294,12 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
 /* The functions below are DIMMER_UNSUPPORTED for lights on the CPU. */
 
 /* Records the update into the caller's command buffer, outside a render pass, with the barriers that let fragment and
- * compute shaders sample afterwards. The command buffer must be of `queue_family`, and be submitted to `queue`, once.
- * Its compute pipeline, compute descriptor sets and push constants are others afterwards. Nothing changed: nothing is
- * recorded (0 dispatches). A call that records overwrites what the commands of `frames_in_flight` updates ago read:
- * their submission must have completed, as the fence of so many frames ago says; where dimmer_lights_submit() made it,
- * the call blocks until then, and where that has a queue of its own, until all
- * that it sent is done. */
+ * compute shaders sample afterwards. The command buffer must be of `queue_family`, and be submitted to `queue`, once,
+ * recordings in the order of their calls and before any later dimmer_lights_submit(). Its compute pipeline, compute
+ * descriptor sets and push constants are others afterwards. Nothing changed: nothing is recorded (0 dispatches). A call
+ * that records overwrites what the commands of `frames_in_flight` updates ago read: their submission must have
+ * completed, as the fence of so many frames ago says; where dimmer_lights_submit() made it, the call blocks until then,
+ * and where that has a queue of its own, until all that it sent is done. */
 dimmer_result dimmer_lights_record(dimmer_lights* lights, VkCommandBuffer commands, dimmer_update_stats* stats);
 /* What the last call that found work recorded will never run (a frame was given up): the next update does its work.
  * Calls that found nothing to do may have come since. DIMMER_NOT_FOUND where dimmer_lights_submit() found work since,

@@ -128,12 +128,13 @@ class Runtime : public LightState {
 
     // Records the update into the caller's command buffer, outside a render pass: a few dispatches (UpdateMode), with
     // the barriers that let fragment and compute shaders sample afterwards. The command buffer must be of
-    // VulkanContext::queue_family, and be submitted to VulkanContext::queue, once. Its compute pipeline, compute
-    // descriptor sets and push constants are others afterwards. Nothing changed: records nothing (0 dispatches). A call
-    // that records overwrites the work list of the update frames_in_flight updates ago: where record() made that, its
-    // submission must have completed on the GPU (idle calls do not count, so that the fence of frames_in_flight frames
-    // ago says so); where submit() did, the call blocks until it has, and where submit() has another queue, until all
-    // that it sent has.
+    // VulkanContext::queue_family, and be submitted to VulkanContext::queue, once, recordings in the order of their
+    // calls and before any later submit(): each writes only what changed since the one before. Its compute pipeline,
+    // compute descriptor sets and push constants are others afterwards. Nothing changed: records nothing (0
+    // dispatches). A call that records overwrites the work list of the update frames_in_flight updates ago: where
+    // record() made that, its submission must have completed on the GPU (idle calls do not count, so that the fence of
+    // frames_in_flight frames ago says so); where submit() did, the call blocks until it has, and where submit() has
+    // another queue, until all that it sent has.
     Expected<UpdateStats> record(VkCommandBuffer commands);
     // The commands of the last record() that found work will never run (a frame was given up): the next update does
     // their work. Calls of record() and submit() that found nothing to do may have come since. Where submit() found
