@@ -167,9 +167,8 @@ class Bake {
         baked_.dependent_doors = dependentDoors(baked_.door_flux, settings_);
         if (baked_.bounces == settings_.bounces_max)
             baked_.warnings.push_back(
-                "the bounces had not died down when there had been as many as the quality's 'bounces' allow; some "
-                "light is "
-                "missing (walls that reflect nearly all of it make it last)");
+                "the bounces had not died down after as many as the quality's 'bounces' allow; some light is missing "
+                "(walls that reflect nearly all of it make it last)");
         return std::move(baked_);
     }
 

@@ -67,6 +67,7 @@ SkySampler::SkySampler(const Scene& scene) : scene_(scene), peaks_above_(std::nu
     const double mean = static_cast<double>(all.flux) / (4 * std::numbers::pi);
     peaks_above_ = static_cast<float>(std::min(peak_over_mean * mean, double{std::numeric_limits<float>::max()}));
     for (const Part part : all_parts) tables_[part] = tableOf(part);
+    if (!empty()) peaks_share_ = tables_[Peaks].flux / (tables_[Peaks].flux + tables_[Rest].flux);
 }
 
 SkySampler::Part SkySampler::partOf(glm::vec3 radiance_cd_m2) const {
@@ -93,9 +94,8 @@ SkySampler::Table SkySampler::tableOf(Part part) const {
 
 uint32_t SkySampler::samplesOf(Part part, uint32_t samples) const {
     if (samples == 0 || tables_[part].empty()) return 0;
-    const float share = tables_[Peaks].flux / (tables_[Peaks].flux + tables_[Rest].flux);
-    const auto of_peaks = std::max(1u, static_cast<uint32_t>(std::lround(share * static_cast<float>(samples))));
     if (tables_[Peaks].empty()) return samples;
+    const auto of_peaks = std::max(1u, static_cast<uint32_t>(peaks_share_ * static_cast<float>(samples) + 0.5f));
     return part == Peaks ? of_peaks : std::max(1u, samples - std::min(of_peaks, samples));
 }
 

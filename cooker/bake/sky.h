@@ -49,7 +49,8 @@ class SkySampler {
     Table tableOf(Part part) const;
 
     const Scene& scene_;
-    float peaks_above_;  // cd/m2, of the brightest channel
+    float peaks_above_;      // cd/m2, of the brightest channel
+    float peaks_share_ = 0;  // of all flux
     std::array<Table, 2> tables_;
 };
 

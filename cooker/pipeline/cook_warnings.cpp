@@ -45,8 +45,7 @@ std::optional<std::string> withoutLight(const Scene& scene) {
         return {};
     return scene.file +
            ": has no light, and all of it comes out black; export it with punctual lights, or give it a sky or a "
-           "material "
-           "that shines";
+           "material that shines";
 }
 
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {

@@ -85,16 +85,20 @@ Bytes withoutOtherChunks(const Bytes& glb, const GlbParts& parts) {
     return out;
 }
 
-size_t deepestNesting(std::string_view json) {
-    size_t depth = 0, deepest = 0;
+// Deepest nesting; on_string(begin, end, depth) for every string's content, so many brackets deep.
+size_t scanJson(std::span<const unsigned char> json, auto&& on_string) {
+    size_t depth = 0, deepest = 0, string_begin = 0;
     bool in_string = false;
     for (size_t i = 0; i < json.size(); ++i) {
-        const char c = json[i];
+        const unsigned char c = json[i];
         if (in_string) {
             if (c == '\\') ++i;
-            if (c == '"') in_string = false;
+            if (c != '"') continue;
+            in_string = false;
+            on_string(string_begin, i, depth);
         } else if (c == '"') {
             in_string = true;
+            string_begin = i + 1;
         } else if (c == '{' || c == '[') {
             deepest = std::max(deepest, ++depth);
         } else if ((c == '}' || c == ']') && depth > 0) {
@@ -108,29 +112,14 @@ size_t deepestNesting(std::string_view json) {
 // animations of what is no node. It passes over members that it does not know, so these get names of the same length.
 void hideFromParser(std::span<unsigned char> json) {
     constexpr std::array<std::string_view, 2> hidden = {"animations", "skins"};
-    size_t depth = 0, string_begin = 0;
-    bool in_string = false;
-    for (size_t i = 0; i < json.size(); ++i) {
-        const unsigned char c = json[i];
-        if (in_string) {
-            if (c == '\\') ++i;
-            if (c != '"') continue;
-            in_string = false;
-            const auto text = json.subspan(string_begin, i - string_begin);
-            size_t after = i + 1;
-            while (after < json.size() && std::isspace(json[after])) ++after;
-            if (depth != 1 || after == json.size() || json[after] != ':') continue;
-            for (const std::string_view name : hidden)
-                if (std::ranges::equal(text, name)) text.back() = '_';
-        } else if (c == '"') {
-            in_string = true;
-            string_begin = i + 1;
-        } else if (c == '{' || c == '[') {
-            ++depth;
-        } else if ((c == '}' || c == ']') && depth > 0) {
-            --depth;
-        }
-    }
+    scanJson(json, [&](size_t begin, size_t end, size_t depth) {
+        const auto text = json.subspan(begin, end - begin);
+        const auto after =
+            std::ranges::find_if_not(json.subspan(end + 1), [](unsigned char c) { return std::isspace(c); });
+        if (depth != 1 || after == json.end() || *after != ':') return;
+        if (std::ranges::any_of(hidden, [&](std::string_view name) { return std::ranges::equal(text, name); }))
+            text.back() = '_';
+    });
 }
 
 // Files that the level names.
@@ -281,14 +270,15 @@ Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
         json = parts->json;
         if (!parts->only) *bytes = withoutOtherChunks(*bytes, *parts);
     }
-    if (deepestNesting(json) > nesting_max)
+    const std::span json_in_file = std::span(*bytes).subspan(glb ? header_bytes + chunk_header_bytes : 0, json.size());
+    if (scanJson(json_in_file, [](size_t, size_t, size_t) {}) > nesting_max)
         return fail(ErrorCode::BadInput, fmt::format("{}: its JSON nests more than {} levels deep. Remove such custom "
                                                      "properties.",
                                                      file, nesting_max));
     const std::string folder = std::filesystem::absolute(path).parent_path().string();
     try {
         if (auto ok = checkTypes(json, file); !ok) return std::unexpected(ok.error());
-        hideFromParser(std::span(*bytes).subspan(glb ? header_bytes + chunk_header_bytes : 0, json.size()));
+        hideFromParser(json_in_file);
         Expected<tinygltf::Model> model = parse(*bytes, glb, externalFiles(json, folder), file);
         if (model && !model->asset.version.starts_with("2"))
             return fail(ErrorCode::BadInput,

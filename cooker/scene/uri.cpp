@@ -22,8 +22,8 @@ std::string percentDecoded(const std::string& uri) {
 
 std::string percentEncoded(const std::string& path) {
     constexpr std::string_view plain =
-                                   "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/!$&'()*+,;=:@",
-                               digits = "0123456789ABCDEF";
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/!$&'()*+,;=:@";
+    constexpr std::string_view digits = "0123456789ABCDEF";
     std::string uri;
     for (const char c : path) {
         const auto byte = static_cast<unsigned char>(c);

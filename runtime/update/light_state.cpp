@@ -51,22 +51,11 @@ Expected<void> checkHandle(std::span<const Element> elements, ElementKind kind, 
                             what, kindName(kind)));
 }
 
-// A fade that adds up its steps ends by some roundings beside where it should; refused, it would leave a lamp on.
-constexpr float rounding_share = 1e-5f;
-float settled(float value, float max) {
-    if (value < 0 && value >= -rounding_share * max) return 0;
-    return value > max && value - max <= rounding_share * max ? max : value;
-}
-Weight settled(const Weight& w, float max) {
-    return {settled(w.r, max), settled(w.g, max), settled(w.b, max)};
-}
-
 bool inRange(float value, float max) {
     return value >= 0 && value <= max;
 }  // false for NaN
 
-Expected<void> settleWeight(const Element& set, Weight& weight) {
-    weight = settled(weight, set.max_weight);
+Expected<void> checkWeight(const Element& set, const Weight& weight) {
     if (inRange(weight.r, set.max_weight) && inRange(weight.g, set.max_weight) && inRange(weight.b, set.max_weight))
         return {};
     return fail(ErrorCode::InvalidArgument,
@@ -74,8 +63,7 @@ Expected<void> settleWeight(const Element& set, Weight& weight) {
                             set.name, weight.r, weight.g, weight.b, set.max_weight));
 }
 
-Expected<void> settleOpen(const Element& door, float& open) {
-    open = settled(open, 1);
+Expected<void> checkOpen(const Element& door, float open) {
     if (inRange(open, 1)) return {};
     return fail(ErrorCode::InvalidArgument,
                 fmt::format("Door \"{}\": {} is not within 0 (closed)..1 (open).", door.name, open));
@@ -97,9 +85,9 @@ Expected<void> resolve(std::span<const Element> elements, const StateAssignment&
     const auto index = lookUp(elements, is_door ? ElementKind::Door : ElementKind::LightSet, assignment.name);
     if (!index) return std::unexpected(index.error());
     const Element& element = elements[*index];
-    Weight weight = assignment.value;
-    if (auto ok = is_door ? settleOpen(element, weight.r) : settleWeight(element, weight); !ok) return ok;
-    changes.push_back({*index, is_door ? Weight(weight.r) : weight});
+    if (auto ok = is_door ? checkOpen(element, assignment.value.r) : checkWeight(element, assignment.value); !ok)
+        return ok;
+    changes.push_back({*index, assignment.value});
     return {};
 }
 
@@ -165,7 +153,7 @@ Expected<Door> LightState::door(std::string_view name) const {
 
 Expected<void> LightState::setWeight(LightSet set, Weight weight) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::LightSet, set.element); !ok) return ok;
-    if (auto ok = settleWeight(pack_.elements()[set.element], weight); !ok) return ok;
+    if (auto ok = checkWeight(pack_.elements()[set.element], weight); !ok) return ok;
     if (auto ok = checkHeld(set.element, weight); !ok) return ok;
     setElement(set.element, weight);
     return {};
@@ -173,7 +161,7 @@ Expected<void> LightState::setWeight(LightSet set, Weight weight) {
 
 Expected<void> LightState::setDoor(Door door, float open) {
     if (auto ok = checkHandle(pack_.elements(), ElementKind::Door, door.element); !ok) return ok;
-    if (auto ok = settleOpen(pack_.elements()[door.element], open); !ok) return ok;
+    if (auto ok = checkOpen(pack_.elements()[door.element], open); !ok) return ok;
     setElement(door.element, Weight(open));
     return {};
 }
@@ -188,9 +176,8 @@ Expected<void> LightState::apply(std::string_view state) {
         if (assignment.target != StateAssignment::Target::AllSets) continue;
         for (uint32_t i = 0; i < elements.size(); ++i) {
             if (elements[i].kind != ElementKind::LightSet) continue;
-            Weight weight = assignment.value;
-            if (auto ok = settleWeight(elements[i], weight); !ok) return ok;
-            if (!held_[i]) changes.push_back({i, weight});
+            if (auto ok = checkWeight(elements[i], assignment.value); !ok) return ok;
+            if (!held_[i]) changes.push_back({i, assignment.value});
         }
     }
     for (const StateAssignment& assignment : *assignments) {

@@ -51,8 +51,8 @@ TEST(Sky, DirectionsAreWhereTheyAreSaidToBe) {
     EXPECT_EQ(texel({-1, 0.1f, -0.1f}).x, 0);
 }
 
-// Counts per texel against shares of flux, of the two texels that outshine the sky and of all others: a chi-square of
-// 126 degrees of freedom lies below 200 but for 1 in 30,000.
+// Counts per texel against shares of flux, of the two texels that outshine the sky and of the 126 others: a chi-square
+// of 1 degree of freedom lies below 17.3, one of 125 below 199, but for 1 in 30,000.
 TEST(Sky, SamplesFollowTheFlux) {
     constexpr uint32_t width = 16, height = 8, samples = 200000;
     std::mt19937 random(3);
@@ -97,7 +97,7 @@ TEST(Sky, SamplesFollowTheFlux) {
             else
                 chi2 += (counts[i] - expected) * (counts[i] - expected) / expected;
         }
-        EXPECT_LT(chi2, 200);
+        EXPECT_LT(chi2, part == SkySampler::Peaks ? 17.3 : 199);
     }
     EXPECT_NEAR(drawn_integral, of_all, 1e-4);
     EXPECT_EQ(of_all, 8);
@@ -107,7 +107,8 @@ TEST(Sky, SamplesFollowTheFlux) {
 }
 
 // A sun of 2 x 2 texels with nine tenths of a floor's light, in a dim sky: no texel is off by more than the sky's own
-// noise, a tenth of a tenth, and the mean by 0.5 %. (How many of a few samples found the sun was chance: up to 23 %.)
+// noise, a tenth of a tenth, and the mean by half of that. (How many of a few samples found the sun was chance: up to
+// 23 %.)
 TEST(Sky, HowManySamplesFindTheSunIsNoChance) {
     constexpr uint32_t width = 512, height = 256;
     const auto radiance = [](uint32_t x, uint32_t y) {
@@ -119,7 +120,7 @@ TEST(Sky, HowManySamplesFindTheSunIsNoChance) {
             expected += static_cast<double>(radiance(x, row).x) * texelOverFloor(width, height, row);
     BakedScene b(floorUnder(skyImage(width, height, radiance)));
     b.bake({.final_rays = 2048, .noise_max = 0.01f});
-    for (size_t i = 0; i < b.texels.size(); ++i) EXPECT_NEAR(static_cast<double>(b.lux(i).y) / expected, 1, 0.02);
+    for (size_t i = 0; i < b.texels.size(); ++i) EXPECT_NEAR(static_cast<double>(b.lux(i).y) / expected, 1, 0.01);
     EXPECT_NEAR(mean(b) / expected, 1, 0.005);
 }
 

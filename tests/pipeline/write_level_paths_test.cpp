@@ -26,6 +26,14 @@ std::string skyNamedBy(const fs::path& glb) {
     return document["scenes"][0]["extras"].value("dimmer_sky_image", "");
 }
 
+Expected<CookResult> cookedQuickly(const TemporaryFolder& folder, const fs::path& source) {
+    const auto profile = writeText(folder, "quick.json", R"({"bake": {"draft": {"samples_per_texel": 1,
+        "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
+    SilentProgress silent;
+    return cook({.level = source, .pack = folder.path / "a.dimmer", .profile = profile.string(), .quality = "draft"},
+                silent);
+}
+
 // A photometric file is named by a URI, whose escapes a folder's name may look like.
 TEST(WriteLevelPaths, FoldersThatLookLikeEscapesNameTheSameProfile) {
     const TemporaryFolder folder;
@@ -37,11 +45,7 @@ TEST(WriteLevelPaths, FoldersThatLookLikeEscapesNameTheSameProfile) {
     level.document["extensions"]["EXT_lights_ies"]["lights"] = json::array({{{"uri", "l%20amp.ies"}}});
     level.addNode({{"name", "spot"}, {"extensions", {{"EXT_lights_ies", {{"light", 0}}}}}});
     const auto source = writeLevel(folder, level, "50%41/level.gltf");
-    const auto profile = writeText(folder, "quick.json", R"({"bake": {"draft": {"samples_per_texel": 1,
-        "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
-    SilentProgress silent;
-    const auto cooked = cook(
-        {.level = source, .pack = folder.path / "a.dimmer", .profile = profile.string(), .quality = "draft"}, silent);
+    const auto cooked = cookedQuickly(folder, source);
     ASSERT_TRUE(cooked.has_value()) << cooked.error().message;
     std::vector<std::string> warnings;
     const auto written = folder.path / "out/level.glb";
@@ -62,11 +66,7 @@ TEST(WriteLevelPaths, ThroughLinksAndDotsNameTheSameSky) {
     LevelFile level = twoCells();
     level.document["scenes"][0]["extras"] = {{"dimmer_sky_image", "sky.hdr"}};
     const auto source = writeLevel(folder, level, "levels/level.gltf");
-    const auto profile = writeText(folder, "quick.json", R"({"bake": {"draft": {"samples_per_texel": 1,
-        "series_rays": 4, "rays": 4, "emitter_samples": 1}}})");
-    SilentProgress silent;
-    const auto cooked = cook(
-        {.level = source, .pack = folder.path / "a.dimmer", .profile = profile.string(), .quality = "draft"}, silent);
+    const auto cooked = cookedQuickly(folder, source);
     ASSERT_TRUE(cooked.has_value()) << cooked.error().message;
     const auto expectFound = [&](const fs::path& from, const fs::path& to, const fs::path& real) {
         std::vector<std::string> warnings;

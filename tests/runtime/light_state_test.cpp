@@ -81,27 +81,6 @@ TEST_F(LightStateTest, RefusedWeightsChangeNothing) {
     EXPECT_EQ(weightOf("alarm"), Weight(2));
 }
 
-// Ten steps of a tenth are 1.0000001, and back down -7e-8.
-TEST_F(LightStateTest, FadesEndAtTheirEnds) {
-    float t = 0;
-    for (int i = 0; i < 10; ++i) {
-        t += 0.1f;
-        EXPECT_TRUE(state.setWeight(set("hall"), t)) << t;
-        EXPECT_TRUE(state.setDoor(door("front"), t)) << t;
-    }
-    ASSERT_GT(t, 1);
-    EXPECT_EQ(weightOf("hall"), Weight(1));
-    EXPECT_EQ(state.open(door("front")), 1);
-    t = 1;
-    for (int i = 0; i < 10; ++i) {
-        t -= 0.1f;
-        EXPECT_TRUE(state.setWeight(set("hall"), {t, 1, t})) << t;
-        EXPECT_TRUE(state.apply("door:front=" + std::to_string(std::max(t, 0.0f)))) << t;
-    }
-    ASSERT_LT(t, 0);
-    EXPECT_EQ(weightOf("hall"), Weight(0, 1, 0));
-}
-
 TEST_F(LightStateTest, HandlesOfTheWrongKindAreRefused) {
     EXPECT_FALSE(state.setWeight(LightSet{3}, 0));
     EXPECT_FALSE(state.setWeight(LightSet{99}, 0));

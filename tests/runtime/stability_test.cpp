@@ -151,8 +151,8 @@ TEST_P(Stability, WeightsOnTheEdgeGiveFiniteLight) {
     PackData data = test::randomPack(35, {.doors = 1, .color_format = GetParam()});
     data.elements[2].max_weight = std::numeric_limits<float>::max();
     CpuRuntime runtime(packOf(std::move(data)));
-    const float largest = std::numeric_limits<float>::max();
-    EXPECT_FALSE(runtime.setWeight(LightSet{0}, 2.0001f));
+    const float one_up = std::nextafter(2.0f, 3.0f), largest = std::numeric_limits<float>::max();
+    EXPECT_FALSE(runtime.setWeight(LightSet{0}, one_up));
     for (const float w : {std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::min(),
                           std::nextafter(2.0f, 0.0f), 2.0f}) {
         ASSERT_TRUE(runtime.setWeight(LightSet{0}, w));

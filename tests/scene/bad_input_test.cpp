@@ -472,6 +472,7 @@ TEST(SceneBadInput, SkinsAndAnimationsAreNotAskedFor) {
                          {"target",
                           {{"path", "pointer"},
                            {"extensions", {{"KHR_animation_pointer", {{"pointer", "/materials/0"}}}}}}}}})}}});
+    level.node(0)["skin"] = 0;
     level.node(0)["extras"] = {{"skins", 1}, {"animations", "\"skins\": {"}};  // no members of the document
     ASSERT_IMPORTED(level.import());
     ASSERT_IMPORTED(importBytes("level.glb", level.glb()));

@@ -172,8 +172,8 @@ void dimmer_lights_destroy(dimmer_lights* lights);
 
 /* Changes cost nanoseconds and take effect with the next update. At the start every light set is at 1 (or its maximum,
  * where that is smaller) and every door is closed. A weight is 0 .. max_weight, per channel where it has three;
- * `open` is 0 (closed) .. 1 (open); beyond either end by a fade's rounding (1e-5 of the maximum) is that end, further
- * is refused and changes nothing. An element that is no light set, or no door, is DIMMER_INVALID_ARGUMENT. */
+ * `open` is 0 (closed) .. 1 (open); a fade that adds up its steps clamps them, as 1.0000001 is refused and changes
+ * nothing. An element that is no light set, or no door, is DIMMER_INVALID_ARGUMENT. */
 dimmer_result dimmer_lights_set_weight(dimmer_lights* lights, uint32_t light_set, float weight);
 dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light_set, float r, float g, float b);
 dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open);

@@ -61,8 +61,7 @@ class LightState {
     Expected<Door> door(std::string_view name) const;
 
     // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum, and, unless
-    // it is 0, for a set whose records are not loaded (Runtime::dropRecords). Beyond 0 or the maximum by no more than a
-    // fade's rounding (1e-5 of the maximum) it counts as that; doors likewise.
+    // it is 0, for a set whose records are not loaded (Runtime::dropRecords).
     Expected<void> setWeight(LightSet set, Weight weight);
     // `open`: 0 closed .. 1 open.
     Expected<void> setDoor(Door door, float open);
