@@ -1,16 +1,15 @@
 #include <bake/series.h>
 
 #include <bake/activity.h>
+#include <bake/convergence.h>
 #include <bake/direct.h>
 #include <bake/door_pairs.h>
 #include <bake/final_gather.h>
 #include <bake/links.h>
 #include <bake/sampling.h>
-#include <bake/sums.h>
 
 #include <atomic>
 #include <bit>
-#include <cfloat>
 #include <cmath>
 #include <utility>
 
@@ -38,11 +37,6 @@ uint32_t samplesOfEmitters(const BakeSettings& settings) {
     return std::max(settings.emitter_samples, by_rays);
 }
 
-// After so many rounds each group's light leaps by what its last step announces; see bounce(). Earlier the steps do not
-// shrink evenly yet, later there is less to gain.
-constexpr uint32_t rounds_before_leap = 6;
-// Places where a group has less than this share of its mean light count for less: what is still to come there is faint.
-constexpr float dim_share = 1e-2f;
 // Links are random, and each costs a trip to memory: asked for so many links ahead.
 constexpr size_t links_ahead = 8;
 
@@ -203,8 +197,10 @@ class Expansion {
         glm::vec3 operator*(float s) const { return glm::vec3(light[0], light[1], light[2]) * s; }
     };
 
-    // One more bounce along the links, of the groups that still run; of the others, what `bounced` has.
-    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced) const {
+    // One more bounce along the links, of the groups that still run: `weight` of the way to it from what was there
+    // before `bounced`, see Acceleration; of the others, what `bounced` has. Empties `previous`, block by block.
+    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced, SparseLight& previous,
+                       glm::vec3 weight) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
         constexpr float share_through_doors = 1.0f / (1 + door_rays_per_ray);
         return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
@@ -225,9 +221,15 @@ class Expansion {
                 }
                 row.clear();
                 const Rounding rounding(i, Rounding::Of::Bounced);
-                for (const uint32_t t : sum.touched())
-                    if (const glm::vec3 lux = sum[t] * lux_per_radiance; least_.empty() || luminance(lux) >= least_[t])
-                        row.emplace_back(t, lux, rounding);
+                const auto old_row = previous.row(i);
+                auto old = old_row.begin();
+                for (const uint32_t t : sum.touched()) {
+                    const glm::vec3 lux = sum[t] * lux_per_radiance;
+                    if (!least_.empty() && luminance(lux) < least_[t]) continue;
+                    while (old != old_row.end() && old->term < t) ++old;
+                    const glm::vec3 had = old != old_row.end() && old->term == t ? old->value() : glm::vec3(0);
+                    row.emplace_back(t, had + weight * (lux - had), rounding);
+                }
                 sum.clear();
                 const size_t followed = row.size();
                 for (const TermLight& l : bounced.row(i))
@@ -235,6 +237,7 @@ class Expansion {
                 if (row.size() > followed) std::ranges::sort(row, {}, term_of);
                 emit(std::span<const TermLight>(row));
             }
+            previous.dropBlock(begin);
         });
     }
 
@@ -244,158 +247,33 @@ class Expansion {
             if (const uint32_t term = paths_.moved(l.term, path, own); term != no_term) sum[term].add(l, share);
     }
 
-    // visit(receiver, entry of `after`, what `before` has of it), in order.
-    static void forEachStep(const SparseLight& before, const SparseLight& after, size_t begin, size_t end,
-                            auto&& visit) {
-        for (size_t i = begin; i < end; ++i) {
-            const auto old = before.row(i);
-            auto at = old.begin();
-            for (const TermLight& l : after.row(i)) {
-                while (at != old.end() && at->term < l.term) ++at;
-                visit(i, l, at != old.end() && at->term == l.term ? at->value() : glm::vec3(0));
-            }
-        }
-    }
-
-    // Of one light group, over places that count alike: what lies in a dim room as well as what the sun lights. Each
-    // channel by itself: what red walls do to a light dies down later than what they do to the blue in it.
-    struct Flux {
-        // Shares of what is there, m2: bounced so far; what the last round changed, either way.
-        glm::dvec3 sum{0}, step{0};
-        glm::dvec3 ratio{1};  // of the last two steps
-        glm::dvec3 ratio_at_leap{0};
-        glm::vec3 floor_lux{0};
-
-        glm::dvec3 shrinks() const { return glm::max(ratio, ratio_at_leap); }
-        // Whether less than a share of the light, in its strongest channel, is still to come in any.
-        bool ends(float tail_max) const {
-            const glm::dvec3 q = shrinks();
-            const double most = static_cast<double>(tail_max) * std::max({sum.x, sum.y, sum.z});
-            for (int c = 0; c < 3; ++c)
-                if (step[c] > 0 && !(q[c] < 1 && step[c] * q[c] / (1 - q[c]) < most)) return false;
-            return true;
-        }
-        // What is still to come of the last step, in steps.
-        glm::vec3 toCome() const {
-            glm::vec3 steps(0);
-            for (int c = 0; c < 3; ++c)
-                if (const double q = ratio_at_leap[c]; q < 1) steps[c] = static_cast<float>(q / (1 - q));
-            return steps;
-        }
-    };
-
-    // Light of each group at a receiver, added to `there`; and taken away again.
-    void addUp(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
-        for (const TermLight& l : row) there[paths_.group(l.term)] += l.value();
-    }
-    void clear(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
-        for (const TermLight& l : row) there[paths_.group(l.term)] = glm::vec3(0);
-    }
-
-    void measure(const SparseLight& before, std::vector<Flux>& groups) const {
-        // Of each group the area that has light, then the light.
-        const size_t count = groups.size();
-        const Sums all = sumOverRows(receivers_, Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
-            std::vector<glm::vec3> there(count);  // of each group
-            for (size_t i = begin; i < end; ++i) {
-                addUp(out_.bounced.row(i), there);
-                for (const TermLight& l : out_.bounced.row(i)) {
-                    const size_t group = paths_.group(l.term);
-                    const float lux = luminance(std::exchange(there[group], glm::vec3(0)));
-                    if (!(lux > 0)) continue;
-                    sum.of[2 * group] += static_cast<double>(gatherer_.areaM2(i));
-                    sum.of[2 * group + 1] += static_cast<double>(gatherer_.areaM2(i) * lux);
-                }
-            }
-        });
-        for (size_t g = 0; g < count; ++g)
-            groups[g].floor_lux =
-                glm::vec3(dim_share * static_cast<float>(all.of[2 * g + 1] / std::max(all.of[2 * g], 1e-30)) + FLT_MIN);
-        // Of each group and channel the light and the step, as shares of what is there; and the step as a share of what
-        // was there when the step before was measured, so that light which grows does not make its steps look smaller.
-        constexpr size_t numbers = 9;
-        const Sums now = sumOverRows(receivers_, Sums(numbers * count), [&](size_t begin, size_t end, Sums& sum) {
-            std::vector<glm::vec3> there(count), there_before(count);  // of each group
-            for (size_t i = begin; i < end; ++i) {
-                addUp(out_.bounced.row(i), there);
-                addUp(before.row(i), there_before);
-                forEachStep(before, out_.bounced, i, i + 1, [&](size_t, const TermLight& l, glm::vec3 old) {
-                    const size_t group = paths_.group(l.term);
-                    const glm::vec3 is = there[group] + groups[group].floor_lux;
-                    // Where there was none, a step is no more than twice what is there.
-                    const glm::vec3 was = glm::max(there_before[group] + groups[group].floor_lux, 0.5f * is);
-                    const glm::vec3 step = glm::abs(l.value() - old);
-                    const float area = gatherer_.areaM2(i);
-                    for (int c = 0; c < 3; ++c) {
-                        double* const of = &sum.of[numbers * group + 3 * static_cast<size_t>(c)];
-                        of[0] += static_cast<double>(area * l.value()[c] / is[c]);
-                        of[1] += static_cast<double>(area * step[c] / is[c]);
-                        of[2] += static_cast<double>(area * step[c] / was[c]);
-                    }
-                });
-                clear(out_.bounced.row(i), there);
-                clear(before.row(i), there_before);
-            }
-        });
-        for (size_t g = 0; g < count; ++g) {
-            if (!running_[g]) continue;
-            for (int c = 0; c < 3; ++c) {
-                const double* const of = &now.of[numbers * g + 3 * static_cast<size_t>(c)];
-                groups[g].ratio[c] = groups[g].step[c] > 0 ? of[2] / groups[g].step[c] : 1;
-                groups[g].sum[c] = of[0];
-                groups[g].step[c] = of[1];
-            }
-        }
-    }
-
-    // What is still to come adds up to the last step times q / (1 - q), when every step is q times the one before:
-    // adds that to the light of the groups that still run.
-    SparseLight leap(const SparseLight& before, const std::vector<Flux>& groups) const {
-        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
-            std::vector<TermLight> row;
-            size_t current = begin;
-            const auto emitUpTo = [&](size_t i) {
-                for (; current < i; ++current, row.clear()) emit(std::span<const TermLight>(row));
-            };
-            forEachStep(before, out_.bounced, begin, end, [&](size_t i, const TermLight& l, glm::vec3 old) {
-                emitUpTo(i);
-                const glm::vec3 steps = runs(l.term) ? groups[paths_.group(l.term)].toCome() : glm::vec3(0);
-                row.emplace_back(l.term, l.value() + steps * (l.value() - old), Rounding(i, Rounding::Of::Foreseen));
-            });
-            emitUpTo(end);
-        });
-    }
-
-    // Running sum: each round follows the whole light once, so round n holds bounces 1 to n. Once the steps shrink
-    // evenly, the light leaps to where they lead; the rounds after that mend what the leap got wrong from place to
-    // place. Each group ends when what is still to come of its own light is little.
+    // Running sum: each round follows the whole light once. Each group ends when what is still to come of its own light
+    // is little.
     void bounce() {
         progress_.stage("bounces" + what_for_, settings_.bounces_max);
-        out_.bounced = SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
-            for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
-        });
+        Acceleration acceleration(longRunAlbedo(gatherer_, links_, settings_.series_rays));
+        Convergence convergence(gatherer_, acceleration.ratio());
+        const auto dark = [this] {
+            return SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
+                for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
+            });
+        };
+        SparseLight previous = dark();
+        out_.bounced = dark();
         out_.bounces.assign(paths_.groupCount(), 0);
-        std::vector<Flux> groups(paths_.groupCount());
         for (uint32_t n = 0; n < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
-            const SparseLight before = std::move(out_.bounced);
-            out_.bounced = follow(outgoing(before, false), before);
+            SparseLight next = follow(outgoing(out_.bounced, false), out_.bounced, previous, acceleration.nextWeight());
+            previous = std::exchange(out_.bounced, std::move(next));
             decideLeast(n);
             progress_.advance(1);
-            measure(before, groups);
-            bool any_leaps = false;
+            convergence.measure(previous, out_.bounced, running_);
             for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
                 if (!running_[g]) continue;
-                Flux& group = groups[g];
-                if (group.ends(settings_.tail_max)) {
+                if (convergence.ends(g, settings_.tail_max))
                     running_[g] = 0;
-                    continue;
-                }
-                ++out_.bounces[g];
-                if (n + 1 != rounds_before_leap) continue;
-                for (int c = 0; c < 3; ++c)
-                    if (group.ratio[c] < 1) group.ratio_at_leap[c] = group.ratio[c], any_leaps = true;
+                else
+                    ++out_.bounces[g];
             }
-            if (any_leaps) out_.bounced = leap(before, groups);
         }
         links_ = {};
     }

@@ -27,7 +27,7 @@ namespace dimmer::cook {
 // and is rounded again by the same would no longer be right in the mean.
 class Rounding {
    public:
-    enum class Of : uint32_t { Direct, Bounced, Outgoing, Foreseen, Around };
+    enum class Of : uint32_t { Direct, Bounced, Outgoing, Around };
     Rounding(size_t receiver, Of of) {
         for (uint32_t c = 0; c < 3; ++c)
             bits_[c] = hash(static_cast<uint32_t>(receiver), 3 * static_cast<uint32_t>(of) + c);
@@ -135,6 +135,9 @@ class Sparse {
         for (const auto& block : blocks_) count += block.size();
         return count;
     }
+
+    // Gives back the memory of a row's block, which nobody reads again.
+    void dropBlock(size_t row) { blocks_[row / rows_per_block] = {}; }
 
     // change(entry) for every entry, in parallel.
     void forEach(auto&& change) {

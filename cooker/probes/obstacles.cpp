@@ -81,8 +81,7 @@ void Obstacles::prepare(const std::vector<uint32_t>& near) {
 std::array<Obstacle, 4> Obstacles::from(const Barycentric& point, const std::array<bool, 4>& wanted) const {
     std::array<Obstacle, 4> out;
     if (by_rays_) {
-        const glm::vec3 at =
-            point[0] * corners_[0] + point[1] * corners_[1] + point[2] * corners_[2] + point[3] * corners_[3];
+        const glm::vec3 at = position(point);
         for (size_t v = 0; v < 4; ++v)
             if (wanted[v]) out[v] = byRays(at, v);
         return out;
@@ -135,6 +134,10 @@ Obstacle Obstacles::byRays(glm::vec3 from, size_t corner) const {
     if (!hit) return {};
     const auto last = rays_.nearest(corners_[corner], -towards, distance_m, seed);
     return {true, hit->back, hit->triangle, last ? last->triangle : hit->triangle, hit->distance_m / distance_m};
+}
+
+glm::vec3 Obstacles::position(const Barycentric& point) const {
+    return point[0] * corners_[0] + point[1] * corners_[1] + point[2] * corners_[2] + point[3] * corners_[3];
 }
 
 Barycentric Obstacles::field(uint32_t triangle) const {

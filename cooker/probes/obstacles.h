@@ -31,6 +31,7 @@ class Obstacles {
     bool none() const { return !by_rays_ && count_ == 0; }
     // On the ways from a point to each of the corners that are `wanted`.
     std::array<Obstacle, 4> from(const Barycentric& point, const std::array<bool, 4>& wanted) const;
+    glm::vec3 position(const Barycentric& point) const;
     // Signed distances of the corners from a triangle's plane.
     Barycentric field(uint32_t triangle) const;
 

@@ -18,6 +18,9 @@ constexpr float off_surface_share = 0.02f;  // of the way to a probe
 constexpr float same_plane_m = 1e-4f;
 constexpr uint32_t leak_cost = 3, miss_cost = 1;
 constexpr uint32_t lonely_miss_cost = 8;  // of a point that no other probe is taken to see
+// Beyond the level's box, over which the grid's own reaches, hardly anyone asks for light: points there count so many
+// times less, and decide where there are no others.
+constexpr uint32_t beyond_share = 16;
 constexpr std::array<int8_t, 4> seen_everywhere = {127, 127, 127, 127};
 constexpr std::array<int8_t, 4> seen_nowhere = {-127, -127, -127, -127};
 
@@ -81,8 +84,7 @@ class Table {
         obstacles_ = &obstacles;
         free_ = free;
         for (const Weights& w : pointsAtCorners()) look(w);
-        for (uint32_t i = 0; i < tries_per_sample * points && points_.size() - at_surfaces_ < corner_samples + points;
-             ++i)
+        for (uint32_t i = 0; i < tries_per_sample * points && points_.size() - besides_ < corner_samples + points; ++i)
             look(pointInside(sequence3d(i, 1)));
         const size_t step = places.size() / points + 1;
         for (size_t i = 0; i < places.size(); i += step) look(places[i]);
@@ -93,7 +95,7 @@ class Table {
     void clear() {
         points_.clear();
         buried_.clear();
-        at_surfaces_ = 0;
+        besides_ = 0;
         planes_.clear();
         numbers_.clear();
         for (auto& rows : rows_) rows.clear();
@@ -114,6 +116,7 @@ class Table {
     struct Point {
         Weights at;
         std::array<bool, 4> seen = {};
+        uint32_t scale = draw_scale;  // of its costs
         std::array<uint32_t, 4> miss = {miss_cost, miss_cost, miss_cost, miss_cost};
         std::array<uint32_t, 4> plane = {};  // that hides it from each probe
     };
@@ -135,8 +138,17 @@ class Table {
             if (found[v].last != found[v].first) numberOf(found[v].last);
         }
         const bool open = 2 * backs <= hidden || point.seen != std::array<bool, 4>{};
+        if (open && !isInLevel(w)) {
+            point.scale = draw_scale / beyond_share;
+            ++besides_;
+        }
         (open ? points_ : buried_).push_back(point);
         if (!open && surfaces) lookAtSurface(w, found);
+    }
+
+    bool isInLevel(const Weights& w) const {
+        const glm::vec3 p = obstacles_->position(w);
+        return p == glm::clamp(p, rays_->boundsMin(), rays_->boundsMax());
     }
 
     // From where ways to the probes come out of geometry: what is open of a tetrahedron that lies below the floor for
@@ -148,9 +160,9 @@ class Table {
             if (share >= 1) continue;
             Weights out;
             for (size_t k = 0; k < 4; ++k) out[k] = (1 - share) * w[k] + (k == v ? share : 0);
-            const size_t before = points_.size();
+            const size_t before = points_.size() - besides_;
             look(out, false);
-            at_surfaces_ += points_.size() - before;
+            besides_ += points_.size() - besides_ - before;
         }
     }
 
@@ -209,8 +221,9 @@ class Table {
             for (size_t k = 0; k < 4; ++k) {
                 g.at[k][i % lanes] = points_[i].at[k];
                 g.seen[k][i % lanes] = points_[i].seen[k] ? -1 : 0;
-                g.miss[k][i % lanes] = static_cast<int>(draw_scale * points_[i].miss[k]);
+                g.miss[k][i % lanes] = static_cast<int>(points_[i].scale * points_[i].miss[k]);
             }
+            g.leak[i % lanes] = static_cast<int>(points_[i].scale * leak_cost);
         }
         buried_grouped_.assign((buried_.size() + lanes - 1) / lanes, {});
         for (size_t i = 0; i < buried_.size(); ++i)
@@ -225,9 +238,8 @@ class Table {
             taken_for_seen = g.at[0] * field[0] + g.at[1] * field[1] + g.at[2] * field[2] + g.at[3] * field[3] > 0;
         };
         for (const Group& g : points_grouped_) {
-            constexpr int leak = draw_scale * leak_cost;
             take(g);
-            sum += ((taken_for_seen & leak) | (~taken_for_seen & g.miss[v])) & (taken_for_seen ^ g.seen[v]);
+            sum += ((taken_for_seen & g.leak) | (~taken_for_seen & g.miss[v])) & (taken_for_seen ^ g.seen[v]);
         }
         for (const Group& g : buried_grouped_) {
             take(g);
@@ -273,13 +285,14 @@ class Table {
     struct Group {
         std::array<Lanes, 4> at{};
         std::array<IntLanes, 4> seen{}, miss{};  // seen: all bits or none
+        IntLanes leak{};
     };
 
     const RayScene* rays_ = nullptr;
     const Obstacles* obstacles_ = nullptr;
     std::array<bool, 4> free_ = {};
     std::vector<Point> points_, buried_;
-    size_t at_surfaces_ = 0;  // of points_
+    size_t besides_ = 0;  // of points_, at surfaces or beyond the level
     std::vector<Group> points_grouped_, buried_grouped_;
     std::vector<Weights> planes_;                         // that stopped rays
     std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane

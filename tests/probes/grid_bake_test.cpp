@@ -216,6 +216,37 @@ TEST(Visibility, LooksAtTheOpenPartAlone) {
     EXPECT_GE(checked, 100u);
 }
 
+// Below a floor that is a slab, and beyond the level's box, there is air again, and most of what a tetrahedron at the
+// box's corners holds: it must not decide what is seen of the rooms above.
+TEST(Visibility, WhatLiesBeyondTheLevelDecidesNothing) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addSolid(scene, "floor", {0.1f, -0.1f, 0}, {4.3f, 0.1f, 1.7f}, white);
+    addSolid(scene, "wall", {0.1f, 1.35f, 0}, {0.1f, 1.35f, 1.7f}, white);
+    const RayScene rays(scene);
+    const std::array<glm::vec3, 4> corners = {
+        glm::vec3(-4.45f, -0.45f, 1.95f), {0.889f, 0.153f, 1.417f}, {-0.622f, 0.047f, 0.16f}, {4.65f, -0.45f, 1.95f}};
+    for (const bool corner_free : {false, true}) {
+        GlobalGrid grid;
+        grid.tetrahedra.resize(1);
+        grid.visibility = {findVisibility(rays, corners, {corner_free, true, true, corner_free})};
+        size_t checked = 0;
+        for (uint32_t i = 0; i < 4000; ++i) {
+            glm::vec4 b(0.1f * unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)),
+                        0.1f * unitFloat(hash(i, 4)));
+            b /= b.x + b.y + b.z + b.w;
+            const glm::vec3 p = b.x * corners[0] + b.y * corners[1] + b.z * corners[2] + b.w * corners[3];
+            // The wall, and 1/127 of 5 m for each of two roundings.
+            if (p.y < 0.01f || (p.x > -0.08f && p.x < 0.28f)) continue;
+            ++checked;
+            const auto weights = probeWeights(grid, {0, {b.x, b.y, b.z, b.w}});
+            const size_t beyond_wall = p.x < 0.1f ? 1 : 2;
+            EXPECT_FALSE(weights[beyond_wall] > 0) << "at x = " << p.x << ", y = " << p.y;
+        }
+        EXPECT_GE(checked, 100u);
+    }
+}
+
 // Behind the wall stands only a corner of the box, which sees nothing: what lies on its side belongs to it, not to the
 // probes of the other room.
 TEST(Visibility, WhatNoProbeSeesBelongsToTheCornerOnItsSide) {
