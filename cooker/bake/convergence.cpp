@@ -1,9 +1,12 @@
 #include <bake/convergence.h>
 
-#include <bake/sums.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cfloat>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace dimmer::cook {
@@ -12,78 +15,85 @@ namespace {
 // Places where a group has less than this share of its mean light count for less: what is still to come there is faint.
 constexpr float dim_share = 1e-2f;
 
-// Steps of less than this share of the light are as much the doing of what rounds it (TermLight): they say nothing of
-// how the light shrinks, which is then as it was before.
-constexpr double rounding_share = 0.002;
+// Of TermLight, a standard deviation; and beyond so many of them it is not rounding.
+constexpr double rounding_share = 0.0025, deviations = 2;
 
-// Walks are long enough for what they began with not to count, and many enough for a percent.
-constexpr uint32_t walks = 4096, walk_bounces = 8;
+// The first ones' growth says what they began with.
+constexpr uint32_t walks = 2048, walk_bounces = 16, bounces_counted = 8;
 // Of a closed room of perfect mirrors nothing can be foreseen.
 constexpr float albedo_max = 0.98f;
+
+double beyondRounding(double sum, double variance) {
+    return std::max(0.0, std::abs(sum) - deviations * std::sqrt(variance));
+}
+
+// Of one channel. After each bounce as many walks go on from each place as light is left there: without that, few
+// would carry all of it in the end.
+float longRunAlbedo(const Gatherer& gatherer, const Links& links, uint32_t rays, int channel) {
+    std::vector<size_t> at(walks), next(walks);
+    std::vector<double> left(walks);
+    for (uint64_t walk = 0; walk < walks; ++walk) at[walk] = walk * gatherer.receiverCount() / walks;
+    double counted = 1;
+    for (uint32_t bounce = 0; bounce < walk_bounces; ++bounce) {
+        tbb::parallel_for(tbb::blocked_range<uint32_t>(0, walks), [&](const tbb::blocked_range<uint32_t>& some) {
+            std::vector<Link> seen;
+            for (uint32_t walk = some.begin(); walk < some.end(); ++walk) {
+                links.get(at[walk], seen);
+                // Links are sorted by path, those over free paths come first.
+                const auto free = static_cast<uint32_t>(std::ranges::count(seen, free_path, &Link::path));
+                left[walk] = 0;
+                if (free == 0) continue;
+                at[walk] = seen[hash(walk, bounce) % free].receiver;
+                left[walk] = static_cast<double>(gatherer.reflectance(at[walk])[channel]) * free / rays;
+            }
+        });
+        const double sum = std::accumulate(left.begin(), left.end(), 0.0);
+        if (!(sum > 0)) return 0;
+        if (bounce >= walk_bounces - bounces_counted) counted *= sum / walks;
+        double up_to = left[0];
+        for (size_t walk = 0, from = 0; walk < walks; ++walk) {
+            while (up_to < (static_cast<double>(walk) + 0.5) / walks * sum && from + 1 < walks) up_to += left[++from];
+            next[walk] = at[from];
+        }
+        std::swap(at, next);
+    }
+    return static_cast<float>(std::pow(counted, 1.0 / bounces_counted));
+}
 
 }  // namespace
 
 glm::vec3 longRunAlbedo(const Gatherer& gatherer, const Links& links, uint32_t rays) {
-    // Per bounce and channel, what is left of all walks.
-    constexpr size_t channels = 3;
-    const size_t receivers = gatherer.receiverCount();
-    const Sums left = sumOverRows(
-        receivers == 0 ? 0 : walks, Sums(channels * walk_bounces), [&](size_t begin, size_t end, Sums& sum) {
-            std::vector<Link> seen;
-            for (size_t walk = begin; walk < end; ++walk) {
-                auto at = static_cast<size_t>(static_cast<uint64_t>(walk) * receivers / walks);
-                glm::dvec3 weight(1);
-                for (uint32_t bounce = 0; bounce < walk_bounces; ++bounce) {
-                    links.get(at, seen);
-                    const auto free = static_cast<size_t>(std::ranges::count(seen, free_path, &Link::path));
-                    if (free == 0) break;
-                    // Links are sorted by path, those over free paths come first.
-                    const uint32_t chosen = hash(static_cast<uint32_t>(walk), bounce) % free;
-                    at = seen[chosen].receiver;
-                    weight *= glm::dvec3(gatherer.reflectance(at)) * (static_cast<double>(free) / rays);
-                    for (size_t c = 0; c < channels; ++c) sum.of[channels * bounce + c] += weight[static_cast<int>(c)];
-                }
-            }
-        });
     glm::vec3 albedo(0);
-    constexpr uint32_t half = walk_bounces / 2;
-    for (size_t c = 0; c < channels; ++c) {
-        const double middle = left.of[channels * (half - 1) + c], last = left.of[channels * (walk_bounces - 1) + c];
-        if (middle > 0)
-            albedo[static_cast<int>(c)] = static_cast<float>(std::pow(last / middle, 1.0 / (walk_bounces - half)));
-    }
-    return glm::min(albedo, albedo_max);
+    for (int c = 0; c < 3 && gatherer.receiverCount() > 0; ++c)
+        albedo[c] = std::min(longRunAlbedo(gatherer, links, rays, c), albedo_max);
+    return albedo;
 }
 
-Acceleration::Acceleration(glm::vec3 albedo) : albedo_(albedo), weight_after_(2.0f / (2.0f - albedo * albedo)) {}
+Acceleration::Acceleration(glm::vec3 albedo, uint32_t links)
+    : albedo_(albedo),
+      links_(static_cast<float>(links)),
+      foci2_(albedo * albedo * (1 - 1 / links_)),
+      weight_after_(2.0f / (2.0f - foci2_)) {}
 
 glm::vec3 Acceleration::nextWeight() {
-    const glm::vec3 weight_then = 1.0f / (1.0f - albedo_ * albedo_ * weight_after_ / 4.0f);
+    const glm::vec3 weight_then = 1.0f / (1.0f - foci2_ * weight_after_ / 4.0f);
     return std::exchange(weight_, std::exchange(weight_after_, weight_then));
 }
 
 glm::vec3 Acceleration::ratio() const {
-    return albedo_ / (1.0f + glm::sqrt(1.0f - albedo_ * albedo_));
+    return albedo_ * (1 + 1 / std::sqrt(links_)) / (1.0f + glm::sqrt(1.0f - foci2_));
 }
 
-Convergence::Convergence(const Gatherer& gatherer, glm::vec3 ratio)
-    : gatherer_(gatherer), paths_(gatherer.paths()), ratio_(ratio), groups_(paths_.groupCount()) {}
+Convergence::Convergence(const Gatherer& gatherer, glm::vec3 albedo, glm::vec3 ratio)
+    : gatherer_(gatherer), paths_(gatherer.paths()), albedo_(albedo), ratio_(ratio), groups_(paths_.groupCount()) {}
 
-// Light of each group at a receiver, added to `there`; and taken away again.
-void Convergence::addUp(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
-    for (const TermLight& l : row) there[paths_.group(l.term)] += l.value();
-}
-void Convergence::clear(std::span<const TermLight> row, std::vector<glm::vec3>& there) const {
-    for (const TermLight& l : row) there[paths_.group(l.term)] = glm::vec3(0);
-}
-
-// A share of each group's mean over the area that has light of it.
-void Convergence::measureFloors(const SparseLight& light) {
-    const size_t count = groups_.size();
-    const Sums all = sumOverRows(light.rows(), Sums(2 * count), [&](size_t begin, size_t end, Sums& sum) {
-        std::vector<glm::vec3> there(count);  // of each group
+// Floors: a share of each group's mean over the area that has light of it.
+void Convergence::begin(const SparseLight& light) {
+    const size_t groups = groups_.size();
+    const Sums all = sumOverRows(light.rows(), Sums(2 * groups), [&](size_t begin, size_t end, Sums& sum) {
+        std::vector<glm::vec3> there(groups);  // of each group
         for (size_t i = begin; i < end; ++i) {
-            addUp(light.row(i), there);
+            for (const TermLight& l : light.row(i)) there[paths_.group(l.term)] += l.value();
             for (const TermLight& l : light.row(i)) {
                 const size_t group = paths_.group(l.term);
                 const float lux = luminance(std::exchange(there[group], glm::vec3(0)));
@@ -93,77 +103,69 @@ void Convergence::measureFloors(const SparseLight& light) {
             }
         }
     });
-    for (size_t g = 0; g < count; ++g)
+    for (size_t g = 0; g < groups; ++g)
         groups_[g].floor_lux =
             glm::vec3(dim_share * static_cast<float>(all.of[2 * g + 1] / std::max(all.of[2 * g], 1e-30)) + FLT_MIN);
 }
 
-void Convergence::measure(const SparseLight& before, const SparseLight& after, std::span<const uint8_t> running) {
-    measureFloors(after);
-    // Of each group and channel the light and the step, as shares of what is there; and the step as a share of what
-    // was there when the step before was measured, so that light which grows does not make its steps look smaller.
-    constexpr size_t numbers = 9;
-    const size_t count = groups_.size();
-    const Sums now = sumOverRows(after.rows(), Sums(numbers * count), [&](size_t begin, size_t end, Sums& sum) {
-        std::vector<glm::vec3> there(count), there_before(count);  // of each group
-        for (size_t i = begin; i < end; ++i) {
-            const auto old_row = before.row(i), row = after.row(i);
-            addUp(row, there);
-            addUp(old_row, there_before);
-            auto old = old_row.begin();
-            for (const TermLight& l : row) {
-                while (old != old_row.end() && old->term < l.term) ++old;
-                const glm::vec3 had = old != old_row.end() && old->term == l.term ? old->value() : glm::vec3(0);
-                const size_t group = paths_.group(l.term);
-                const glm::vec3 is = there[group] + groups_[group].floor_lux;
-                // Where there was none, a step is no more than twice what is there.
-                const glm::vec3 was = glm::max(there_before[group] + groups_[group].floor_lux, 0.5f * is);
-                const glm::vec3 step = glm::abs(l.value() - had);
-                const float area = gatherer_.areaM2(i);
-                for (int c = 0; c < 3; ++c) {
-                    double* const of = &sum.of[numbers * group + 3 * static_cast<size_t>(c)];
-                    of[0] += static_cast<double>(area * l.value()[c] / is[c]);
-                    of[1] += static_cast<double>(area * step[c] / is[c]);
-                    of[2] += static_cast<double>(area * step[c] / was[c]);
-                }
-            }
-            clear(row, there);
-            clear(old_row, there_before);
-        }
-    });
-    for (size_t g = 0; g < count; ++g) {
-        if (!running[g]) continue;
-        Flux& group = groups_[g];
-        glm::dvec3 step(0), ratio(1);
-        for (int c = 0; c < 3; ++c) {
-            const double* const of = &now.of[numbers * g + 3 * static_cast<size_t>(c)];
-            if (group.step[c] > 0) ratio[c] = of[2] / group.step[c];
-            group.sum[c] = of[0];
-            step[c] = of[1];
-        }
-        foresee(group, step, ratio);
+Convergence::Part::Part(const Convergence& of, Sums& sums)
+    : of_(of), sums_(sums), there_lux_(of.groups_.size()), in_block_(of.paths_.termCount()) {}
+
+void Convergence::Part::addRow(size_t receiver, std::span<const Change> row) {
+    const float area_m2 = of_.gatherer_.areaM2(receiver);
+    for (const Change& c : row) there_lux_[of_.paths_.group(c.term)] += c.gets_lux;
+    for (const Change& c : row) {
+        const size_t group = of_.paths_.group(c.term);
+        const glm::dvec3 m2_per_lux(area_m2 / (there_lux_[group] + of_.groups_[group].floor_lux));
+        const glm::dvec3 there_m2 = glm::dvec3(c.gets_lux) * m2_per_lux;
+        for (size_t k = 0; k < channels; ++k) sums_.of[index(group, There, k)] += there_m2[static_cast<int>(k)];
+        const glm::dvec3 rounding_m2 = rounding_share * glm::dvec3(c.has_lux) * m2_per_lux;
+        auto& lacking = in_block_[c.term];
+        lacking.m2 += glm::dvec3(c.gets_lux - c.has_lux) * m2_per_lux;
+        lacking.variance_m4 += rounding_m2 * rounding_m2;
     }
+    for (const Change& c : row) there_lux_[of_.paths_.group(c.term)] = glm::vec3(0);
 }
 
-void Convergence::foresee(Flux& group, glm::dvec3 step, glm::dvec3 ratio) const {
-    const double most = std::max({group.sum.x, group.sum.y, group.sum.z});
-    for (int c = 0; c < 3; ++c) {
-        const bool by_light = step[c] > rounding_share * most;
-        // Steps shrink now faster, now slower.
-        if (by_light) group.ratio[c] = std::max(std::sqrt(ratio[c] * group.last_ratio[c]), ratio_[c]);
-        const double steps = group.ratio[c] < 1 ? group.ratio[c] / (1 - group.ratio[c]) : HUGE_VAL;
-        const double by_step = step[c] > 0 ? step[c] * steps : 0;
-        group.to_come[c] = by_light ? by_step : std::min(by_step, group.to_come[c] * group.ratio[c]);
+void Convergence::Part::closeBlock() {
+    for (const uint32_t t : in_block_.touched())
+        for (size_t k = 0; k < channels; ++k) {
+            const size_t group = of_.paths_.group(t);
+            const double m2 = in_block_[t].m2[static_cast<int>(k)];
+            const double variance_m4 = in_block_[t].variance_m4[static_cast<int>(k)];
+            sums_.of[index(group, Number::Lacking, k)] += m2;
+            sums_.of[index(group, Variance, k)] += variance_m4;
+            sums_.of[index(group, LackingInBlocks, k)] += beyondRounding(m2, variance_m4);
+        }
+    in_block_.clear();
+}
+
+void Convergence::end(const Sums& all, std::span<const uint8_t> running) {
+    for (size_t g = 0; g < groups_.size(); ++g) {
+        if (!running[g]) continue;
+        for (size_t k = 0; k < channels; ++k) {
+            const auto sum = [&](Number number) { return all.of[index(g, number, k)]; };
+            const auto c = static_cast<int>(k);
+            const double lacking_m2 =
+                std::max(beyondRounding(sum(Number::Lacking), sum(Variance)), sum(LackingInBlocks));
+            const double there_m2 = sum(There);
+            // All bounces of what is lacking; and that as a share of what there will be then. As errors of accelerated
+            // rounds go to and fro, a small one may be on its way through 0: no smaller than the largest before can
+            // have become.
+            const double all_bounces_m2 = lacking_m2 / (1 - albedo_[c]);
+            const double error_m2 = there_m2 > 0 ? there_m2 / (there_m2 + all_bounces_m2) * all_bounces_m2 : 0;
+            groups_[g].there_m2[c] = there_m2;
+            groups_[g].to_come_m2[c] = ratio_[c] * std::max(error_m2, groups_[g].to_come_m2[c]);
+        }
     }
-    group.step = step;
-    group.last_ratio = ratio;
 }
 
 bool Convergence::ends(uint32_t g, float tail_max) const {
     const Flux& group = groups_[g];
-    const double most = static_cast<double>(tail_max) * std::max({group.sum.x, group.sum.y, group.sum.z});
+    const double most =
+        static_cast<double>(tail_max) * std::max({group.there_m2.x, group.there_m2.y, group.there_m2.z});
     for (int c = 0; c < 3; ++c)
-        if (group.to_come[c] > 0 && group.to_come[c] >= most) return false;
+        if (group.to_come_m2[c] > 0 && group.to_come_m2[c] >= most) return false;
     return true;
 }
 

@@ -5,6 +5,7 @@
 #include <bake/gather.h>
 #include <bake/links.h>
 #include <bake/sparse_light.h>
+#include <bake/sums.h>
 
 #include <glm/glm.hpp>
 #include <span>
@@ -12,58 +13,88 @@
 
 namespace dimmer::cook {
 
-// The share of light that a bounce leaves in the long run, 0..1 per channel: the largest eigenvalue of the transport
-// along `links`, by power iteration over some thousand random walks. Doors are shut. `rays`: behind each receiver's
-// links, those that met nothing among them. Within a few percent; its cost does not grow with the level. Deterministic.
+// The share of light that a bounce leaves in the long run, 0..0.98 per channel: the largest eigenvalue of the transport
+// along the `links` through no door, by power iteration over a population of random walks; within a percent. `rays`:
+// behind each receiver's links, those that met nothing among them. Costs as much in any level. Deterministic.
 glm::vec3 longRunAlbedo(const Gatherer& gatherer, const Links& links, uint32_t rays);
 
 // Chebyshev's semi-iterative method (G. Golub and R. Varga 1961) for x = direct bounce of x: the light of the round
 // after next is x[n+1] = x[n-1] + weight * (bounce of x[n] - x[n-1]), per channel. Light transport has real
-// eigenvalues, as places see one another alike; those within -albedo..albedo then shrink by albedo / (1 + sqrt(1 -
-// albedo^2)) a round in place of `albedo`. An albedo that is off costs rounds; what the light comes to is the same.
+// eigenvalues, -albedo..albedo, as places see one another alike. `links` of each place, drawn at random, add complex
+// ones as far as albedo / sqrt(links) from 0: the weights are those of the ellipse around both (T. Manteuffel 1977),
+// for a single link those of plain bounces. An albedo that is off costs rounds; what the light comes to is the same.
 class Acceleration {
    public:
-    explicit Acceleration(glm::vec3 albedo);
+    Acceleration(glm::vec3 albedo, uint32_t links);
     // Weights of the next round; 1 in the first.
     glm::vec3 nextWeight();
-    // What is left of a step after a round, in the long run.
+    // What a round leaves of what is still to come, in the long run.
     glm::vec3 ratio() const;
 
    private:
     glm::vec3 albedo_;  // below 1
+    float links_;
+    glm::vec3 foci2_;  // the square of the ellipse's foci
     glm::vec3 weight_{1}, weight_after_;
 };
 
-// How far each light group is from its end. Light counts as a share of what is there: what lies in a dim room as well
-// as what the sun lights. Each channel by itself: what red walls do to a light dies down later than what they do to
-// the blue in it.
+// How far each light group is from its end, from what a bounce would change. Light counts as a share of what is there:
+// what lies in a dim room as well as what the sun lights. Each channel by itself: what red walls do to a light dies
+// down later than what they do to the blue in it. What rounding does (TermLight) is told apart by adding up: over the
+// whole group, and over each block of receivers, which are neighbours, where the whole may not see too much light here
+// and too little there.
 class Convergence {
    public:
-    // `ratio`: steps shrink by no more a round.
-    Convergence(const Gatherer& gatherer, glm::vec3 ratio);
+    // What a bounce leaves of light, and a round of what is still to come, in the long run.
+    Convergence(const Gatherer& gatherer, glm::vec3 albedo, glm::vec3 ratio);
 
-    // After a round, for groups that run (per group, not 0).
-    void measure(const SparseLight& before, const SparseLight& after, std::span<const uint8_t> running);
+    struct Change {
+        uint32_t term;
+        glm::vec3 has_lux, gets_lux;  // before a bounce of all light, and after
+    };
+    // One worker's part of a round, block by block.
+    class Part {
+       public:
+        Part(const Convergence& of, Sums& sums);
+        void addRow(size_t receiver, std::span<const Change> row);
+        void closeBlock();
+
+       private:
+        // Of a term, as shares of what is there: what a bounce adds, and the variance that rounding gives it.
+        struct Lacking {
+            glm::dvec3 m2{0}, variance_m4{0};
+        };
+        const Convergence& of_;
+        Sums& sums_;
+        std::vector<glm::vec3> there_lux_;   // per group, 0 between rows
+        TermAccumulator<Lacking> in_block_;  // and in no block before
+    };
+
+    // For groups that run (per group, not 0): a round that begins with `light`; the sums of no part of it; and all of
+    // them, with which it ends.
+    void begin(const SparseLight& light);
+    Sums none() const { return Sums(count * groups_.size()); }
+    void end(const Sums& all, std::span<const uint8_t> running);
+
     // Whether less than a share of the light of the group, in its strongest channel, is still to come in any.
     bool ends(uint32_t group, float tail_max) const;
 
    private:
+    // What is added up of each group, in each channel: what is there; what a bounce adds to it, with its variance; and
+    // the same, either way, of all blocks.
+    enum Number : size_t { There, Lacking, Variance, LackingInBlocks, numbers };
+    static constexpr size_t channels = 3, count = numbers * channels;
+    static size_t index(size_t group, Number number, size_t channel) {
+        return count * group + channels * number + channel;
+    }
     struct Flux {
-        // Shares of what is there, m2: bounced so far; what the last round changed, either way; what is still to come.
-        glm::dvec3 sum{0}, step{0}, to_come{0};
-        glm::dvec3 last_ratio{1};  // of a step and the one before
-        glm::dvec3 ratio{1};       // in the mean over two rounds, while steps are light
+        glm::dvec3 there_m2{0}, to_come_m2{0};  // as shares of what is there
         glm::vec3 floor_lux{0};
     };
 
-    void foresee(Flux& group, glm::dvec3 step, glm::dvec3 ratio) const;
-    void addUp(std::span<const TermLight> row, std::vector<glm::vec3>& there) const;
-    void clear(std::span<const TermLight> row, std::vector<glm::vec3>& there) const;
-    void measureFloors(const SparseLight& light);
-
     const Gatherer& gatherer_;
     const DoorPaths& paths_;
-    glm::dvec3 ratio_;
+    glm::dvec3 albedo_, ratio_;
     std::vector<Flux> groups_;
 };
 

@@ -199,46 +199,74 @@ class Expansion {
 
     // One more bounce along the links, of the groups that still run: `weight` of the way to it from what was there
     // before `bounced`, see Acceleration; of the others, what `bounced` has. Empties `previous`, block by block.
-    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced, SparseLight& previous,
-                       glm::vec3 weight) const {
+    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced, SparseLight& previous, glm::vec3 weight,
+                       Convergence& convergence) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
-        constexpr float share_through_doors = 1.0f / (1 + door_rays_per_ray);
-        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+        SparseLight::Builder next(receivers_);
+        convergence.begin(bounced);
+        const auto followBlocks = [&](size_t first, size_t last, Sums& sums) {
             TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
             std::vector<Link> links;
-            for (size_t i = begin; i < end; ++i) {
-                const uint32_t own = gatherer_.conditionOf(i);
+            std::vector<Convergence::Change> changes;
+            Convergence::Part part(convergence, sums);
+            for (size_t i = first * rows_per_block; i < std::min(last * rows_per_block, receivers_); ++i) {
                 links_.get(i, links);
-                for (size_t k = 0; k < links.size(); ++k) {
-                    if (k + links_ahead < links.size()) radiance.prefetch(links[k + links_ahead].receiver);
-                    const auto there = radiance.row(links[k].receiver);
-                    const uint32_t path = links[k].path;
-                    if (path == free_path && own == no_condition)
-                        for (const TermLight& l : there) sum[l.term] += l;
-                    else
-                        addMoved(there, path, own, path == free_path ? 1 : share_through_doors, sum);
-                }
+                addArriving(radiance, links, gatherer_.conditionOf(i), sum);
                 row.clear();
+                changes.clear();
                 const Rounding rounding(i, Rounding::Of::Bounced);
-                const auto old_row = previous.row(i);
-                auto old = old_row.begin();
+                TermsInOrder before(previous.row(i)), now(bounced.row(i));
                 for (const uint32_t t : sum.touched()) {
                     const glm::vec3 lux = sum[t] * lux_per_radiance;
                     if (!least_.empty() && luminance(lux) < least_[t]) continue;
-                    while (old != old_row.end() && old->term < t) ++old;
-                    const glm::vec3 had = old != old_row.end() && old->term == t ? old->value() : glm::vec3(0);
+                    const glm::vec3 had = before.of(t);
                     row.emplace_back(t, had + weight * (lux - had), rounding);
+                    changes.push_back({t, now.of(t), lux});
                 }
                 sum.clear();
+                part.addRow(i, changes);
                 const size_t followed = row.size();
                 for (const TermLight& l : bounced.row(i))
                     if (!runs(l.term)) row.push_back(l);
                 if (row.size() > followed) std::ranges::sort(row, {}, term_of);
-                emit(std::span<const TermLight>(row));
+                next.put(i, row);
+                if ((i + 1) % rows_per_block != 0 && i + 1 != receivers_) continue;
+                next.close(i / rows_per_block * rows_per_block);
+                previous.dropBlock(i);
+                part.closeBlock();
             }
-            previous.dropBlock(begin);
-        });
+        };
+        convergence.end(sumOverRows(blockCount(receivers_), convergence.none(), followBlocks), running_);
+        return next.finish();
+    }
+
+    // Light of a row, asked for by ascending terms.
+    class TermsInOrder {
+       public:
+        explicit TermsInOrder(std::span<const TermLight> row) : row_(row) {}
+        glm::vec3 of(uint32_t term) {
+            while (!row_.empty() && row_.front().term < term) row_ = row_.subspan(1);
+            return !row_.empty() && row_.front().term == term ? row_.front().value() : glm::vec3(0);
+        }
+
+       private:
+        std::span<const TermLight> row_;
+    };
+
+    // Along a receiver's links; `own`: its condition.
+    void addArriving(const SparseLight& radiance, std::span<const Link> links, uint32_t own,
+                     TermAccumulator<Sum>& sum) const {
+        constexpr float share_through_doors = 1.0f / (1 + door_rays_per_ray);
+        for (size_t k = 0; k < links.size(); ++k) {
+            if (k + links_ahead < links.size()) radiance.prefetch(links[k + links_ahead].receiver);
+            const auto there = radiance.row(links[k].receiver);
+            const uint32_t path = links[k].path;
+            if (path == free_path && own == no_condition)
+                for (const TermLight& l : there) sum[l.term] += l;
+            else
+                addMoved(there, path, own, path == free_path ? 1 : share_through_doors, sum);
+        }
     }
 
     void addMoved(std::span<const TermLight> light, uint32_t path, uint32_t own, float share,
@@ -251,22 +279,18 @@ class Expansion {
     // is little.
     void bounce() {
         progress_.stage("bounces" + what_for_, settings_.bounces_max);
-        Acceleration acceleration(longRunAlbedo(gatherer_, links_, settings_.series_rays));
-        Convergence convergence(gatherer_, acceleration.ratio());
-        const auto dark = [this] {
-            return SparseLight::build(receivers_, [](size_t begin, size_t end, auto emit) {
-                for (size_t i = begin; i < end; ++i) emit(std::span<const TermLight>{});
-            });
-        };
-        SparseLight previous = dark();
-        out_.bounced = dark();
+        const glm::vec3 albedo = longRunAlbedo(gatherer_, links_, settings_.series_rays);
+        Acceleration acceleration = accelerationFor(albedo);
+        Convergence convergence(gatherer_, albedo, acceleration.ratio());
+        SparseLight previous = SparseLight::Builder(receivers_).finish();
+        out_.bounced = SparseLight::Builder(receivers_).finish();
         out_.bounces.assign(paths_.groupCount(), 0);
         for (uint32_t n = 0; n < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
-            SparseLight next = follow(outgoing(out_.bounced, false), out_.bounced, previous, acceleration.nextWeight());
+            SparseLight next =
+                follow(outgoing(out_.bounced, false), out_.bounced, previous, acceleration.nextWeight(), convergence);
             previous = std::exchange(out_.bounced, std::move(next));
             decideLeast(n);
             progress_.advance(1);
-            convergence.measure(previous, out_.bounced, running_);
             for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
                 if (!running_[g]) continue;
                 if (convergence.ends(g, settings_.tail_max))
@@ -276,6 +300,16 @@ class Expansion {
             }
         }
         links_ = {};
+    }
+
+    // Of rounds too few for the tolerance each is plainly one bounce more, or the first ones would be too bright.
+    Acceleration accelerationFor(glm::vec3 albedo) const {
+        const Acceleration acceleration(albedo, settings_.series_rays);
+        for (int c = 0; c < 3; ++c) {
+            const float left = std::pow(acceleration.ratio()[c], static_cast<float>(settings_.bounces_max));
+            if (left > settings_.tail_max * (1 - albedo[c])) return Acceleration(albedo, 1);
+        }
+        return acceleration;
     }
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every

@@ -24,7 +24,8 @@ namespace dimmer::cook {
 
 // What the last bits of light at a receiver are decided by. The same for all terms and bounces, so that more light is
 // never held to be less, and none depends on what else is baked. But another for each kind of light: what was rounded
-// and is rounded again by the same would no longer be right in the mean.
+// and is rounded again by the same would no longer be right in the mean. (An accelerated bounce takes a little of the
+// light of two rounds ago along, so rounded: a hundredth of a percent.)
 class Rounding {
    public:
     enum class Of : uint32_t { Direct, Bounced, Outgoing, Around };
@@ -136,7 +137,7 @@ class Sparse {
         return count;
     }
 
-    // Gives back the memory of a row's block, which nobody reads again.
+    // Gives back the memory of a row's block, of which nobody reads any row again (any() still says what it had).
     void dropBlock(size_t row) { blocks_[row / rows_per_block] = {}; }
 
     // change(entry) for every entry, in parallel.

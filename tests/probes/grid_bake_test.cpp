@@ -230,7 +230,7 @@ TEST(Visibility, WhatLiesBeyondTheLevelDecidesNothing) {
         GlobalGrid grid;
         grid.tetrahedra.resize(1);
         grid.visibility = {findVisibility(rays, corners, {corner_free, true, true, corner_free})};
-        size_t checked = 0;
+        size_t checked = 0, by_own = 0;
         for (uint32_t i = 0; i < 4000; ++i) {
             glm::vec4 b(0.1f * unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)),
                         0.1f * unitFloat(hash(i, 4)));
@@ -242,8 +242,10 @@ TEST(Visibility, WhatLiesBeyondTheLevelDecidesNothing) {
             const auto weights = probeWeights(grid, {0, {b.x, b.y, b.z, b.w}});
             const size_t beyond_wall = p.x < 0.1f ? 1 : 2;
             EXPECT_FALSE(weights[beyond_wall] > 0) << "at x = " << p.x << ", y = " << p.y;
+            by_own += weights[3 - beyond_wall] > 0;
         }
         EXPECT_GE(checked, 100u);
+        EXPECT_GE(by_own, checked * 9 / 10);
     }
 }
 
