@@ -19,7 +19,7 @@ constexpr float dim_share = 1e-2f;
 constexpr double rounding_share = 0.0025, deviations = 2;
 
 // The first ones' growth says what they began with.
-constexpr uint32_t walks = 2048, walk_bounces = 16, bounces_counted = 8;
+constexpr uint32_t walks = 2048, walk_bounces = 32, bounces_counted = 8;
 // Of a closed room of perfect mirrors nothing can be foreseen.
 constexpr float albedo_max = 0.98f;
 
@@ -84,8 +84,14 @@ glm::vec3 Acceleration::ratio() const {
     return albedo_ * (1 + 1 / std::sqrt(links_)) / (1.0f + glm::sqrt(1.0f - foci2_));
 }
 
-Convergence::Convergence(const Gatherer& gatherer, glm::vec3 albedo, glm::vec3 ratio)
-    : gatherer_(gatherer), paths_(gatherer.paths()), albedo_(albedo), ratio_(ratio), groups_(paths_.groupCount()) {}
+// T_n(eigenvalue / foci) / T_n(1 / foci) in the long run, the other way round.
+double Acceleration::eigenvalueOf(double ratio, int channel) const {
+    const double foci = std::sqrt(static_cast<double>(foci2_[channel]));
+    return foci > 0 ? foci * std::cosh(std::max(0.0, std::log(ratio) + std::acosh(1 / foci))) : ratio;
+}
+
+Convergence::Convergence(const Gatherer& gatherer, const Acceleration& pace)
+    : gatherer_(gatherer), paths_(gatherer.paths()), pace_(pace), groups_(paths_.groupCount()) {}
 
 // Floors: a share of each group's mean over the area that has light of it.
 void Convergence::begin(const SparseLight& light) {
@@ -112,17 +118,18 @@ Convergence::Part::Part(const Convergence& of, Sums& sums)
     : of_(of), sums_(sums), there_lux_(of.groups_.size()), in_block_(of.paths_.termCount()) {}
 
 void Convergence::Part::addRow(size_t receiver, std::span<const Change> row) {
-    const float area_m2 = of_.gatherer_.areaM2(receiver);
+    const auto area_m2 = static_cast<double>(of_.gatherer_.areaM2(receiver));
     for (const Change& c : row) there_lux_[of_.paths_.group(c.term)] += c.gets_lux;
     for (const Change& c : row) {
         const size_t group = of_.paths_.group(c.term);
-        const glm::dvec3 m2_per_lux(area_m2 / (there_lux_[group] + of_.groups_[group].floor_lux));
+        // In floats a colour that is not there would be 0 times infinity, as its floor is.
+        const glm::dvec3 m2_per_lux = area_m2 / glm::dvec3(there_lux_[group] + of_.groups_[group].floor_lux);
         const glm::dvec3 there_m2 = glm::dvec3(c.gets_lux) * m2_per_lux;
         for (size_t k = 0; k < channels; ++k) sums_.of[index(group, There, k)] += there_m2[static_cast<int>(k)];
         const glm::dvec3 rounding_m2 = rounding_share * glm::dvec3(c.has_lux) * m2_per_lux;
-        auto& lacking = in_block_[c.term];
-        lacking.m2 += glm::dvec3(c.gets_lux - c.has_lux) * m2_per_lux;
-        lacking.variance_m4 += rounding_m2 * rounding_m2;
+        auto& added = in_block_[c.term];
+        added.m2 += glm::dvec3(c.gets_lux - c.has_lux) * m2_per_lux;
+        added.variance_m4 += rounding_m2 * rounding_m2;
     }
     for (const Change& c : row) there_lux_[of_.paths_.group(c.term)] = glm::vec3(0);
 }
@@ -133,7 +140,7 @@ void Convergence::Part::closeBlock() {
             const size_t group = of_.paths_.group(t);
             const double m2 = in_block_[t].m2[static_cast<int>(k)];
             const double variance_m4 = in_block_[t].variance_m4[static_cast<int>(k)];
-            sums_.of[index(group, Number::Lacking, k)] += m2;
+            sums_.of[index(group, Lacking, k)] += m2;
             sums_.of[index(group, Variance, k)] += variance_m4;
             sums_.of[index(group, LackingInBlocks, k)] += beyondRounding(m2, variance_m4);
         }
@@ -145,19 +152,39 @@ void Convergence::end(const Sums& all, std::span<const uint8_t> running) {
         if (!running[g]) continue;
         for (size_t k = 0; k < channels; ++k) {
             const auto sum = [&](Number number) { return all.of[index(g, number, k)]; };
-            const auto c = static_cast<int>(k);
-            const double lacking_m2 =
-                std::max(beyondRounding(sum(Number::Lacking), sum(Variance)), sum(LackingInBlocks));
-            const double there_m2 = sum(There);
-            // All bounces of what is lacking; and that as a share of what there will be then. As errors of accelerated
-            // rounds go to and fro, a small one may be on its way through 0: no smaller than the largest before can
-            // have become.
-            const double all_bounces_m2 = lacking_m2 / (1 - albedo_[c]);
-            const double error_m2 = there_m2 > 0 ? there_m2 / (there_m2 + all_bounces_m2) * all_bounces_m2 : 0;
-            groups_[g].there_m2[c] = there_m2;
-            groups_[g].to_come_m2[c] = ratio_[c] * std::max(error_m2, groups_[g].to_come_m2[c]);
+            foresee(groups_[g], static_cast<int>(k), sum(There),
+                    std::max(beyondRounding(sum(Lacking), sum(Variance)), sum(LackingInBlocks)));
         }
     }
+}
+
+void Convergence::foresee(Flux& group, int c, double there_m2, double lacking_m2) const {
+    const auto albedo = static_cast<double>(pace_.albedo()[c]), ratio = static_cast<double>(pace_.ratio()[c]);
+    // All bounces of what is lacking, as a share of what there will be then.
+    const auto allBounces = [&](double eigenvalue) {
+        const double m2 = lacking_m2 / (1 - eigenvalue);
+        return m2 > 0 ? there_m2 / (there_m2 + eigenvalue * m2) * m2 : 0;
+    };
+    // Light that stays in a small white room, or beyond an open door, shrinks by less a round than the level's albedo
+    // lets expect. Over two rounds, as it shrinks now faster, now slower; and of what was there before, so that light
+    // which grows does not make what it lacks smaller.
+    const double before_m2 = there_m2 - std::min(lacking_m2, there_m2 / 2);
+    const double now =
+        group.lacking_m2[c] > 0 && before_m2 > 0 ? lacking_m2 / before_m2 * group.there_m2[c] / group.lacking_m2[c] : 0;
+    const double observed = group.last_ratio[c] > 0 ? std::sqrt(now * group.last_ratio[c]) : now;
+    const double eigenvalue =
+        observed > ratio ? std::clamp(pace_.eigenvalueOf(observed, c), albedo, std::max<double>(albedo, albedo_max))
+                         : albedo;
+    // As errors of accelerated rounds go to and fro, a small one may be on its way through 0: no smaller than the
+    // largest before can have become.
+    const bool first = !(group.there_m2[c] > 0);
+    group.foreseen_m2[c] = (first ? albedo : ratio) * std::max(allBounces(albedo), group.foreseen_m2[c]);
+    group.to_come_m2[c] = std::max(group.foreseen_m2[c], std::clamp(observed, ratio, 1.0) * allBounces(eigenvalue));
+    // Of a single round nothing is known.
+    if (first) group.to_come_m2[c] = std::max(group.to_come_m2[c], lacking_m2);
+    group.there_m2[c] = there_m2;
+    group.lacking_m2[c] = lacking_m2;
+    group.last_ratio[c] = now;
 }
 
 bool Convergence::ends(uint32_t g, float tail_max) const {
@@ -165,7 +192,7 @@ bool Convergence::ends(uint32_t g, float tail_max) const {
     const double most =
         static_cast<double>(tail_max) * std::max({group.there_m2.x, group.there_m2.y, group.there_m2.z});
     for (int c = 0; c < 3; ++c)
-        if (group.to_come_m2[c] > 0 && group.to_come_m2[c] >= most) return false;
+        if (group.to_come_m2[c] > 0 && !(group.to_come_m2[c] < most)) return false;
     return true;
 }
 

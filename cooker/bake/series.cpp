@@ -7,7 +7,9 @@
 #include <bake/final_gather.h>
 #include <bake/links.h>
 #include <bake/sampling.h>
+#include <bake/sums.h>
 
+#include <algorithm>
 #include <atomic>
 #include <bit>
 #include <cmath>
@@ -219,7 +221,7 @@ class Expansion {
                 TermsInOrder before(previous.row(i)), now(bounced.row(i));
                 for (const uint32_t t : sum.touched()) {
                     const glm::vec3 lux = sum[t] * lux_per_radiance;
-                    if (!least_.empty() && luminance(lux) < least_[t]) continue;
+                    if (!least_.empty() && luminance(lux) < least_[t]) continue;  // nor does it count as a change
                     const glm::vec3 had = before.of(t);
                     row.emplace_back(t, had + weight * (lux - had), rounding);
                     changes.push_back({t, now.of(t), lux});
@@ -231,7 +233,8 @@ class Expansion {
                     if (!runs(l.term)) row.push_back(l);
                 if (row.size() > followed) std::ranges::sort(row, {}, term_of);
                 next.put(i, row);
-                if ((i + 1) % rows_per_block != 0 && i + 1 != receivers_) continue;
+                const bool block_ends = (i + 1) % rows_per_block == 0 || i + 1 == receivers_;
+                if (!block_ends) continue;
                 next.close(i / rows_per_block * rows_per_block);
                 previous.dropBlock(i);
                 part.closeBlock();
@@ -279,9 +282,8 @@ class Expansion {
     // is little.
     void bounce() {
         progress_.stage("bounces" + what_for_, settings_.bounces_max);
-        const glm::vec3 albedo = longRunAlbedo(gatherer_, links_, settings_.series_rays);
-        Acceleration acceleration = accelerationFor(albedo);
-        Convergence convergence(gatherer_, albedo, acceleration.ratio());
+        Acceleration acceleration = accelerationFor(longRunAlbedo(gatherer_, links_, settings_.series_rays));
+        Convergence convergence(gatherer_, acceleration);
         SparseLight previous = SparseLight::Builder(receivers_).finish();
         out_.bounced = SparseLight::Builder(receivers_).finish();
         out_.bounces.assign(paths_.groupCount(), 0);
@@ -305,10 +307,10 @@ class Expansion {
     // Of rounds too few for the tolerance each is plainly one bounce more, or the first ones would be too bright.
     Acceleration accelerationFor(glm::vec3 albedo) const {
         const Acceleration acceleration(albedo, settings_.series_rays);
-        for (int c = 0; c < 3; ++c) {
-            const float left = std::pow(acceleration.ratio()[c], static_cast<float>(settings_.bounces_max));
-            if (left > settings_.tail_max * (1 - albedo[c])) return Acceleration(albedo, 1);
-        }
+        // The factor is what T_n may differ by from its larger part.
+        for (int c = 0; c < 3; ++c)
+            if (2 * std::pow(acceleration.ratio()[c], static_cast<float>(settings_.bounces_max)) > settings_.tail_max)
+                return Acceleration(albedo, 1);
         return acceleration;
     }
 

@@ -58,7 +58,8 @@ TEST(Acceleration, AsFewLinksNeedAndNoSlower) {
         for (const uint32_t links : {1u, 4u, 16u, 64u}) {
             const Acceleration acceleration(glm::vec3(albedo), links);
             const auto ratio = static_cast<double>(acceleration.ratio().x);
-            EXPECT_LT(ratio, links == 1 ? albedo + 1e-6f : 1.0f);
+            EXPECT_LT(ratio, links == 1 ? albedo + 1e-6f : albedo);
+            EXPECT_NEAR(acceleration.eigenvalueOf(ratio, 0), albedo, 1e-6);
             for (double angle = 0; angle < 2 * pi_d; angle += pi_d / 8) {
                 const std::complex<double> eigenvalue(albedo * std::cos(angle),
                                                       albedo * std::sin(angle) / std::sqrt(links));
@@ -109,10 +110,10 @@ TEST(LongRunAlbedo, OfTwoWallsThatSeeThemselvesAndEachOther) {
     EXPECT_NEAR(albedo.z, 0.3 * 0.4, 0.024 * 0.12);
 }
 
-// Where one of a hundred rooms is white, and light stays in it.
+// Where one of a hundred rooms is nearly white, and light stays in it.
 TEST(LongRunAlbedo, OfAWhiteRoomAmongDarkOnes) {
     Scene scene;
-    const uint32_t dark = addMaterial(scene, lambert(0.2f)), white = addMaterial(scene, lambert(0.9f));
+    const uint32_t dark = addMaterial(scene, lambert(0.6f)), white = addMaterial(scene, lambert(0.9f));
     for (uint32_t room = 0; room < 100; ++room)
         addQuad(scene, room == 42 ? "white" : "dark", {3.0f * room, 0, 0}, {2, 0, 0}, {0, 2, 0},
                 room == 42 ? white : dark);
@@ -125,8 +126,8 @@ TEST(LongRunAlbedo, OfAWhiteRoomAmongDarkOnes) {
         std::vector<Link> itself = {{i, free_path}};
         builder.put(i, itself);
     }
-    // After eight bounces what is left of the dark rooms is 1e-5 of the white one's.
-    EXPECT_NEAR(longRunAlbedo(gatherer, builder.finish(), 1).y, 0.9, 0.003);
+    // After 24 bounces what is left of the dark rooms is 6e-5 of the white one's of each, which is 0.6 % of it for all.
+    EXPECT_NEAR(longRunAlbedo(gatherer, builder.finish(), 1).y, 0.9, 0.01);
 }
 
 TEST(LongRunAlbedo, OfNothingIsNone) {
@@ -140,15 +141,15 @@ TEST(LongRunAlbedo, OfNothingIsNone) {
     EXPECT_EQ(longRunAlbedo(gatherer, builder.finish(), 10), glm::vec3(0));
 }
 
-// Hollow spheres that see nothing of each other, of the first one radius more than of the others, each lit from its
-// centre by a light set of its own.
+// Hollow spheres that see nothing of each other, each lit from its centre by a light set of its own.
 struct Spheres {
-    explicit Spheres(std::vector<glm::vec3> reflectances) : reflectance(std::move(reflectances)) {
+    explicit Spheres(std::vector<glm::vec3> reflectances, const std::vector<float>& radii_m = {2, 1})
+        : reflectance(std::move(reflectances)) {
         for (uint32_t n = 0; n < reflectance.size(); ++n) {
             Material material = lambert(1);
             material.base_color = reflectance[n];
-            area_m2.push_back(addSphere(scene, n == 0 ? 2 : 1, 32, 16, addMaterial(scene, material)));
-            const float x = 10 * static_cast<float>(n);
+            area_m2.push_back(addSphere(scene, radii_m[n], 32, 16, addMaterial(scene, material)));
+            const float x = apart_m * static_cast<float>(n);
             for (glm::vec3& p : scene.meshes.back().positions_m) p.x += x;
             scene.light_sets.push_back({"set " + std::to_string(n), 1});
             addPointLight(scene, {x, 0, 0}, 1000, BakeMode::Indirect).light_set = n;
@@ -159,15 +160,14 @@ struct Spheres {
         glm::dvec3 sum(0);
         double area = 0;
         for (size_t i = 0; i < b.texels.size(); ++i) {
-            if (b.place(i).x < 10 * static_cast<float>(sphere) - 5 ||
-                b.place(i).x > 10 * static_cast<float>(sphere) + 5)
-                continue;
+            if (std::abs(b.place(i).x - apart_m * static_cast<float>(sphere)) > apart_m / 2) continue;
             sum += static_cast<double>(b.texels.area_m2[i]) * glm::dvec3(b.lux(i, groupOf(sphere)));
             area += static_cast<double>(b.texels.area_m2[i]);
         }
         return sum / area / (4 * pi_d * 1000 / area_m2[sphere]);
     }
 
+    static constexpr float apart_m = 100;
     Scene scene;
     std::vector<glm::vec3> reflectance;
     std::vector<double> area_m2;
@@ -192,6 +192,68 @@ TEST(Convergence, GroupsEndWhenTheirOwnLightHasArrived) {
         }
 }
 
+// What is left of light that a bounce leaves `eigenvalue` of when its group ends, at a pace for another albedo.
+double leftAtTheEnd(double eigenvalue, float albedo, float tail_max) {
+    Scene scene;
+    addQuad(scene, "a", {0, 0, 0}, {20, 0, 0}, {0, 20, 0}, addMaterial(scene, lambert(0.4f)));
+    const BakedScene b(scene);
+    const DoorPaths paths(scene, doorsInSight(*b.rays));
+    const EmitterSampler emitters(*b.rays, meshGroups(scene));
+    const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
+    Acceleration pace(glm::vec3(albedo), 128);
+    Convergence convergence(gatherer, pace);
+    const auto row = [](size_t i, double lux) {
+        return TermLight(always_group, glm::vec3(static_cast<float>(lux)), Rounding(i, Rounding::Of::Bounced));
+    };
+    const double end = 1 / (1 - eigenvalue);
+    double before = 0, x = 0;
+    for (uint32_t round = 0; round < 200; ++round) {
+        SparseLight::Builder light(b.texels.size());
+        for (size_t i = 0; i < b.texels.size(); ++i) light.put(i, std::vector{row(i, x)});
+        convergence.begin(light.finish());
+        Sums all = convergence.none();
+        Convergence::Part part(convergence, all);
+        const double bounced = 1 + eigenvalue * x;
+        for (size_t i = 0; i < b.texels.size(); ++i)
+            part.addRow(i, std::vector<Convergence::Change>{
+                               {always_group, row(i, x).value(), glm::vec3(static_cast<float>(bounced))}});
+        part.closeBlock();
+        convergence.end(all, std::vector<uint8_t>{1});
+        before = std::exchange(x, before + static_cast<double>(pace.nextWeight().x) * (bounced - before));
+        if (convergence.ends(always_group, tail_max)) return std::abs(end - x) / end;
+    }
+    return 1;
+}
+
+// A white room so small that the walks which look for the level's albedo do not find it, and rooms that an open door
+// joins; and light that is gone sooner than the level's, whose error changes sign.
+TEST(Convergence, LightIsFollowedToItsEndAtWhateverPace) {
+    constexpr struct {
+        float albedo;
+        double eigenvalue;
+    } cases[] = {{0.5f, 0.9},  {0.3f, 0.8},   {0.1f, 0.8},   {0.02f, 0.8}, {0, 0.5},    {0.75f, 0.9},
+                 {0.8f, 0.9},  {0.65f, 0.5},  {0.65f, 0.2},  {0.65f, 0},   {0.9f, 0.6}, {0.9f, -0.5},
+                 {0.95f, 0.9}, {0.06f, 0.06}, {0.03f, 0.03}, {0.98f, 0.98}};
+    for (const auto& some : cases)
+        for (const float tail : {0.02f, 0.01f, 0.002f})
+            // How fast light shrinks is known as well as the last rounds say it: what is left, to within a quarter.
+            EXPECT_LE(leftAtTheEnd(some.eigenvalue, some.albedo, tail), 1.25 * static_cast<double>(tail))
+                << some.albedo << " " << some.eigenvalue << " " << tail;
+}
+
+// Of texels that are large and a colour that is missing no number may come that is none.
+TEST(Convergence, OfLargeTexelsWithoutRed) {
+    const glm::vec3 rho(0, 0.5f, 0.8f);
+    Spheres spheres({rho}, {40});
+    BakedScene b(spheres.scene, 0.4f);
+    b.bake({.series_rays = 128, .final_rays = 256});
+    EXPECT_EQ(spheres.indirect(b, 0).x, 0);
+    for (int c = 1; c < 3; ++c) {
+        const auto r = static_cast<double>(rho[c]), expected = r / (1 - r);
+        EXPECT_NEAR(spheres.indirect(b, 0)[c], expected, (rays_and_facets + 0.002) * expected) << r;
+    }
+}
+
 // In a closed sphere of albedo 0.8 a bounce leaves 0.8, an accelerated one 0.8 / 1.6 in the long run: for a thousandth
 // of the light some 10 rounds in place of 31. And a channel that walls all but swallow does not wait for ever for what
 // its rounding leaves, nor do walls that are nearly white.
@@ -200,7 +262,10 @@ TEST(Convergence, TakesFewRounds) {
         glm::vec3 reflectance;
         float tail;
         uint32_t rounds;
-    } cases[] = {{glm::vec3(0.8f), 0.001f, 14}, {{0.8f, 0.5f, 0.003f}, 0.001f, 14}, {glm::vec3(0.95f), 0.002f, 30}};
+    } cases[] = {{glm::vec3(0.8f), 0.001f, 14},
+                 {{0.8f, 0.5f, 0.003f}, 0.001f, 14},
+                 {glm::vec3(0.95f), 0.002f, 30},
+                 {glm::vec3(0.98f), 0.01f, 63}};
     for (const auto& some : cases) {
         const Spheres spheres({some.reflectance});
         BakedScene b(spheres.scene);
