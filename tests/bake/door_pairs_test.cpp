@@ -63,8 +63,10 @@ TEST(DoorPairs, AreMeasuredTheSameOneByOne) {
     scene.light_sets = {{"lamp", 1}, {"other", 1}};
     for (uint32_t room = 0; room < 2; ++room) {
         const float away_m = 10 * static_cast<float>(room);
+        const size_t first_wall = scene.meshes.size();
         addBox(scene, {3, 1, 1}, white);
-        for (glm::vec3& p : scene.meshes.back().positions_m) p.z += away_m;
+        for (size_t wall = first_wall; wall < scene.meshes.size(); ++wall)
+            for (glm::vec3& p : scene.meshes[wall].positions_m) p.z += away_m;
         for (uint32_t d = 0; d < 2; ++d)
             addSolid(scene, "leaf", {-1 + 2 * static_cast<float>(d), 0, away_m}, {0.1f, 1, 1}, white, 2 * room + d);
         addPointLight(scene, {-0.2f, 0.2f, 0.1f + away_m}, 100, BakeMode::Full).light_set = room;
