@@ -171,7 +171,7 @@ void Convergence::foresee(Flux& group, int c, double there_m2, double lacking_m2
     const double before_m2 = there_m2 - std::min(lacking_m2, there_m2 / 2);
     const double now =
         group.lacking_m2[c] > 0 && before_m2 > 0 ? lacking_m2 / before_m2 * group.there_m2[c] / group.lacking_m2[c] : 0;
-    const double observed = group.last_ratio[c] > 0 ? std::sqrt(now * group.last_ratio[c]) : now;
+    const double observed = group.last_ratio[c] > 0 ? std::max(now, std::sqrt(now * group.last_ratio[c])) : now;
     const double eigenvalue =
         observed > ratio ? std::clamp(pace_.eigenvalueOf(observed, c), albedo, std::max<double>(albedo, albedo_max))
                          : albedo;
