@@ -1,6 +1,7 @@
 // The C interface to the runtimes.
 #include <c/handles.h>
 
+#include <dimmer/door.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -18,7 +19,10 @@ dimmer_result finish(const Expected<UpdateStats>& done, dimmer_update_stats* out
                 .bytes_read = done->bytes_read,
                 .bytes_written = done->bytes_written,
                 .host_us = done->host_us,
-                .gpu_us = done->gpu_us};
+                .gpu_us = done->gpu_us,
+                .clusters_put_off = done->clusters_put_off,
+                .receivers_waiting = done->receivers_waiting,
+                .probes_resampled = done->probes_resampled};
     return DIMMER_OK;
 }
 
@@ -91,6 +95,8 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
             context, pack->pack,
             {.buffering = asked.buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace,
              .frames_in_flight = asked.frames_in_flight == 0 ? 1 : asked.frames_in_flight,
+             .records_bytes_max = asked.records_bytes_max,
+             .load_records = asked.start_without_records == 0,
              .moving_probes_max = asked.moving_probes_max});
         if (!created) return report(created.error());
         *lights = new dimmer_lights{std::move(*created)};
@@ -114,6 +120,14 @@ dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light
 dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open) {
     if (!given(lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] { return finish(lights->state().setDoor(Door{door}, open)); });
+}
+
+float dimmer_hinged_door_weight(float angle_rad, float angle_max_rad) {
+    return hingedDoorWeight(angle_rad, angle_max_rad);
+}
+
+float dimmer_sliding_door_weight(float travel_m, float width_m) {
+    return slidingDoorWeight(travel_m, width_m);
 }
 
 dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state) {

@@ -1,8 +1,17 @@
-#include <fmt/format.h>
 #include <gpu/vulkan_functions.h>
+
+#include <fmt/format.h>
 
 #include <array>
 #include <mutex>
+
+#ifdef _WIN32
+#define WIN32_LEAN_AND_MEAN
+#define NOMINMAX
+#include <windows.h>
+#else
+#include <dlfcn.h>
+#endif
 
 namespace dimmer {
 
@@ -10,12 +19,25 @@ namespace dimmer {
 DIMMER_VULKAN_FUNCTIONS(DIMMER_DEFINE)
 #undef DIMMER_DEFINE
 
-namespace linked {
-// In a namespace, so that no other code finds it; a function with C's linkage is the same in all of them.
-extern "C" VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL vkGetInstanceProcAddr(VkInstance instance, const char* name);
-}  // namespace linked
-
 namespace {
+
+#if defined(_WIN32)
+constexpr std::array loader_libraries{"vulkan-1.dll"};
+PFN_vkVoidFunction symbolOf(const char* library, const char* name) {
+    const HMODULE opened = LoadLibraryA(library);
+    return opened ? reinterpret_cast<PFN_vkVoidFunction>(GetProcAddress(opened, name)) : nullptr;
+}
+#else
+#if defined(__APPLE__)
+constexpr std::array loader_libraries{"libvulkan.1.dylib", "libvulkan.dylib", "libMoltenVK.dylib"};
+#else
+constexpr std::array loader_libraries{"libvulkan.so.1", "libvulkan.so"};
+#endif
+PFN_vkVoidFunction symbolOf(const char* library, const char* name) {
+    void* const opened = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+    return opened ? reinterpret_cast<PFN_vkVoidFunction>(dlsym(opened, name)) : nullptr;
+}
+#endif
 
 #define DIMMER_NAME(name) #name,
 constexpr std::array function_names{DIMMER_VULKAN_FUNCTIONS(DIMMER_NAME)};
@@ -37,12 +59,25 @@ void use(const FunctionList& found) {
 
 }  // namespace
 
-PFN_vkGetInstanceProcAddr linkedLoader() {
-    return linked::vkGetInstanceProcAddr;
+PFN_vkGetInstanceProcAddr loaderOf(std::span<const char* const> libraries) {
+    for (const char* library : libraries)
+        if (const auto found = symbolOf(library, "vkGetInstanceProcAddr"))
+            return reinterpret_cast<PFN_vkGetInstanceProcAddr>(found);
+    return nullptr;
+}
+
+PFN_vkGetInstanceProcAddr installedLoader() {
+    static const PFN_vkGetInstanceProcAddr loader = loaderOf(loader_libraries);
+    return loader;
 }
 
 Expected<VulkanFunctions> VulkanFunctions::load(PFN_vkGetInstanceProcAddr get_instance_proc_addr, VkInstance instance) {
-    const auto get = get_instance_proc_addr ? get_instance_proc_addr : linkedLoader();
+    const auto get = get_instance_proc_addr ? get_instance_proc_addr : installedLoader();
+    if (!get)
+        return fail(ErrorCode::Unsupported,
+                    fmt::format("Vulkan's loader, {}, is not installed or cannot be opened. Install it, or set "
+                                "VulkanContext::get_instance_proc_addr to the one that the instance is of.",
+                                loader_libraries[0]));
     FunctionList found;
     for (size_t i = 0; i < found.size(); ++i) {
         found[i] = get(instance, function_names[i]);

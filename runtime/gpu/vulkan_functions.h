@@ -6,6 +6,7 @@
 
 #include <vulkan/vulkan.h>
 
+#include <span>
 #include <utility>
 
 // X(name) for each function of the runtime, and of HeadlessDevice once it has an instance.
@@ -85,14 +86,17 @@ namespace dimmer {
 DIMMER_VULKAN_FUNCTIONS(DIMMER_DECLARE)
 #undef DIMMER_DECLARE
 
-// The loader that the program was linked with. Where an engine defines a variable of its name, not to be called.
-PFN_vkGetInstanceProcAddr linkedLoader();
+// Vulkan's loader as this system has it installed, opened when first asked for and never closed; null where there is
+// none. Nothing is linked with it, so that a server without it runs what needs no GPU. Thread-safe.
+PFN_vkGetInstanceProcAddr installedLoader();
+// The same of the first of these libraries that can be opened.
+PFN_vkGetInstanceProcAddr loaderOf(std::span<const char* const> libraries);
 
 // Whoever calls the functions, or owns handles, holds one of these meanwhile: they change only while there is none.
 class VulkanFunctions {
    public:
-    // `get_instance_proc_addr`: null for the linked loader's. Unsupported: it lacks a function for this instance, or
-    // its functions are others than those in use. Thread-safe.
+    // `get_instance_proc_addr`: null for the installed loader's. Unsupported: there is none, it lacks a function for
+    // this instance, or its functions are others than those in use. Thread-safe.
     static Expected<VulkanFunctions> load(PFN_vkGetInstanceProcAddr get_instance_proc_addr, VkInstance instance);
 
     VulkanFunctions() = default;  // holds nothing

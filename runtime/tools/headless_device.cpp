@@ -39,10 +39,10 @@ VkDebugUtilsMessengerCreateInfoEXT messengerInfo(MessageLog& log) {
     return info;
 }
 
-// Of the linked loader. `instance`: null for the functions that need none yet.
+// Of the installed loader, which is there. `instance`: null for the functions that need none yet.
 template <class Function>
 Function loaderFunction(VkInstance instance, const char* name) {
-    return reinterpret_cast<Function>(linkedLoader()(instance, name));
+    return reinterpret_cast<Function>(installedLoader()(instance, name));
 }
 
 bool layerInstalled(const char* name) {
@@ -128,6 +128,8 @@ struct HeadlessDevice::Impl {
 };
 
 Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
+    if (!installedLoader())
+        return fail(ErrorCode::Unsupported, "Vulkan's loader is not installed (Debian: libvulkan1).");
     if (validation && !layerInstalled(validation_layer))
         return fail(
             ErrorCode::Unsupported,

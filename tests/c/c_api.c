@@ -182,6 +182,8 @@ int light_a_model(const char* path, float before_lux[3], float after_lux[3], flo
 static int set_state(const dimmer_pack* pack, dimmer_lights* lights) {
     uint32_t set0, set1, door0;
     float rgb[3];
+    EXPECT(dimmer_sliding_door_weight(0.25f, 0.5f) == 0.5f);
+    EXPECT(fabsf(dimmer_hinged_door_weight(1.04719755f, 1.57079633f) - 0.5f) < 1e-6f); /* 1 - cos 60 degrees */
     EXPECT_OK(dimmer_pack_find_light_set(pack, "set0", &set0));
     EXPECT_OK(dimmer_pack_find_light_set(pack, "set1", &set1));
     EXPECT_OK(dimmer_pack_find_door(pack, "door0", &door0));
@@ -257,7 +259,7 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     const uint32_t *own_irradiance, *own_direction;
     size_t own_count;
     int failed;
-    const dimmer_vulkan_options unknown = {(dimmer_buffering)2, 0, 0}, many = {DIMMER_IN_PLACE, 0, 9};
+    const dimmer_vulkan_options unknown = {.buffering = (dimmer_buffering)2}, many = {.frames_in_flight = 9};
     uint32_t* by_submit = malloc(8 * texel_count);
     EXPECT(by_submit != NULL);
     EXPECT_OK(dimmer_pack_open(path, &pack));
@@ -295,7 +297,7 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     EXPECT_OK(dimmer_lights_set_limits(lights, 64, 0));
     EXPECT_OK(dimmer_lights_apply(lights, "all=0.5"));
     EXPECT_OK(dimmer_lights_submit(lights, &stats));
-    EXPECT(stats.receivers > 0 && stats.receivers <= 64);
+    EXPECT(stats.receivers > 0 && stats.receivers <= 64 && stats.receivers_waiting > 0);
     EXPECT_OK(dimmer_lights_invalidate(lights));
     EXPECT_OK(dimmer_lights_set_limits(lights, 0, 0));
     EXPECT_OK(dimmer_lights_submit(lights, &stats));
@@ -310,7 +312,7 @@ int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan) {
     dimmer_pack* pack = NULL;
     dimmer_lights* lights = NULL;
     VkBuffer probes[3] = {VK_NULL_HANDLE}, tables[3] = {VK_NULL_HANDLE}, of_set = VK_NULL_HANDLE;
-    const dimmer_vulkan_options twice = {DIMMER_DOUBLE_BUFFERED, 0, 2};
+    const dimmer_vulkan_options twice = {.buffering = DIMMER_DOUBLE_BUFFERED, .frames_in_flight = 2};
     dimmer_images now, images;
     uint32_t page_set = 9, probe_set = 9;
     int i;
@@ -335,6 +337,72 @@ int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan) {
     EXPECT_FAILURE(DIMMER_NOT_FOUND, "no set of pages 2", dimmer_lights_get_images_of_set(lights, 2, &images));
     EXPECT_FAILURE(DIMMER_NOT_FOUND, "no set of probes 2", dimmer_lights_get_probes_of_set(lights, 2, &of_set));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_get_probe_buffers(lights, probes, NULL));
+    dimmer_lights_destroy(lights);
+    dimmer_pack_close(pack);
+    return 0;
+}
+
+static int load_all(dimmer_lights* lights) {
+    uint64_t before = 0, done = 0, total = 1;
+    EXPECT_OK(dimmer_lights_continue_loading(lights, 64, NULL, NULL));
+    while (done < total) {
+        EXPECT_OK(dimmer_lights_continue_loading(lights, 0, &done, &total));
+        EXPECT(done >= before && done <= total);
+        before = done;
+        EXPECT_OK(dimmer_lights_submit(lights, NULL));
+    }
+    return 0;
+}
+
+int records_come_and_go(const char* path, const dimmer_vulkan* vulkan, uint32_t* irradiance, uint32_t* direction,
+                        size_t texel_count) {
+    dimmer_pack* pack = NULL;
+    dimmer_lights *lights = NULL, *on_cpu = NULL;
+    const dimmer_vulkan_options tight = {.records_bytes_max = 16};
+    const dimmer_vulkan_options without = {.start_without_records = 1};
+    dimmer_records_state state = DIMMER_RECORDS_LOADED;
+    uint64_t bytes = 7, free_at_first = 7, free_now = 7;
+    int failed;
+    EXPECT_OK(dimmer_pack_open(path, &pack));
+    EXPECT_FAILURE(DIMMER_OUT_OF_MEMORY, "records_bytes_max",
+                   dimmer_lights_create_vulkan(pack, vulkan, &tight, &lights));
+    EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, &without, &lights));
+    EXPECT_OK(dimmer_lights_get_records_state(lights, 0, &state));
+    EXPECT(state == DIMMER_RECORDS_DROPPED);
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "not loaded", dimmer_lights_set_weight(lights, 0, 1));
+    EXPECT_OK(dimmer_lights_get_record_bytes(lights, 0, &bytes, &free_at_first));
+    EXPECT(bytes > 0 && free_at_first >= bytes);
+
+    EXPECT_OK(dimmer_lights_load_records(lights, 0));
+    EXPECT_OK(dimmer_lights_load_records(lights, 1));
+    EXPECT_OK(dimmer_lights_get_records_state(lights, 1, &state));
+    EXPECT(state == DIMMER_RECORDS_LOADING);
+    if ((failed = load_all(lights)) != 0) return failed;
+    EXPECT_OK(dimmer_lights_get_records_state(lights, 1, &state));
+    EXPECT(state == DIMMER_RECORDS_LOADED);
+    EXPECT_OK(dimmer_lights_set_weight(lights, 0, 0.5f));
+    EXPECT_OK(dimmer_lights_set_weight(lights, 1, 1));
+    EXPECT_OK(dimmer_lights_submit(lights, NULL));
+    EXPECT_OK(dimmer_lights_drop_records(lights, 1));
+    EXPECT_OK(dimmer_lights_submit(lights, NULL));
+    EXPECT_OK(dimmer_lights_get_record_bytes(lights, 0, &bytes, &free_now));
+    EXPECT(free_now == free_at_first - bytes);
+    EXPECT_OK(dimmer_lights_read_pages(lights, irradiance, direction, texel_count));
+
+    /* 4 is a door. */
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "no light set", dimmer_lights_load_records(lights, 4));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "no light set", dimmer_lights_drop_records(lights, 4));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "no light set", dimmer_lights_get_records_state(lights, 4, &state));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "no light set",
+                   dimmer_lights_get_record_bytes(lights, UINT32_MAX, &bytes, &free_now));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_get_records_state(lights, 0, NULL));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_get_record_bytes(lights, 0, &bytes, NULL));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "null", dimmer_lights_continue_loading(NULL, 0, NULL, NULL));
+    EXPECT_OK(dimmer_lights_create_cpu(pack, 1, 0, &on_cpu));
+    EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_drop_records(on_cpu, 0));
+    EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_load_records(on_cpu, 0));
+    EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_continue_loading(on_cpu, 0, NULL, NULL));
+    dimmer_lights_destroy(on_cpu);
     dimmer_lights_destroy(lights);
     dimmer_pack_close(pack);
     return 0;

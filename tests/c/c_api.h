@@ -25,6 +25,10 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
                     size_t texel_count);
 /* The buffers of probes, of a pack with a global grid that has dynamic light, by turns after each update. */
 int probe_buffers_take_turns(const char* path, const dimmer_vulkan* vulkan);
+/* In a runtime that starts without records: set0's and set1's are loaded, set1's dropped again; then the state of
+ * "set0=0.5" alone is blended. */
+int records_come_and_go(const char* path, const dimmer_vulkan* vulkan, uint32_t* irradiance, uint32_t* direction,
+                        size_t texel_count);
 /* The example of docs/integrate.md. */
 int shade_player(const char* path, float lux[3]);
 

@@ -116,6 +116,20 @@ TEST_F(CInterfaceGpu, BlendsByVulkan) {
     EXPECT_EQ(pages.direction, expected.direction);
 }
 
+TEST_F(CInterfaceGpu, RecordsComeAndGo) {
+    const dimmer_vulkan vulkan = vulkanOf(device().context());
+    BlendedPages pages;
+    ASSERT_EQ(
+        records_come_and_go(PackOnDisk().path.c_str(), &vulkan, pages.irradiance.data(), pages.direction.data(), 2048),
+        0)
+        << problem;
+    CpuRuntime expected(*Pack::fromData(samplePack()));
+    EXPECT_TRUE(expected.apply("all=0,set0=0.5"));
+    expected.update();
+    EXPECT_TRUE(std::ranges::equal(pages.irradiance, expected.irradiancePages()));
+    EXPECT_TRUE(std::ranges::equal(pages.direction, expected.directionPages()));
+}
+
 TEST_F(CInterfaceGpu, NamesTheBuffersOfProbes) {
     const cook::test::TemporaryFolder folder;
     PackData data = modelPack(1, 20, [](glm::vec3) { return glm::vec3(1); });

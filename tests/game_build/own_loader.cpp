@@ -1,5 +1,5 @@
 // An engine that loads Vulkan by itself, as with volk: it has variables with the names of Vulkan's functions, and the
-// linker takes them for the functions wherever a library calls those.
+// linker takes them for the functions wherever a library calls those. With its own loader named, and with none.
 #define VK_NO_PROTOTYPES
 #include <dimmer/cpu_runtime.h>
 #include <dimmer/runtime.h>
@@ -113,7 +113,9 @@ int main() {
     const auto pack = dimmer::Pack::open(GAME_PACK);
     need(pack.has_value(), GAME_PACK);
     const VkInstance instance = createInstance();
-    const dimmer::VulkanContext vulkan = createDevice(instance);
+    dimmer::VulkanContext vulkan = createDevice(instance);
+    blend(vulkan, *pack);
+    vulkan.get_instance_proc_addr = nullptr;
     blend(vulkan, *pack);
     vkDestroyDevice(vulkan.device, nullptr);
     vkDestroyInstance(instance, nullptr);

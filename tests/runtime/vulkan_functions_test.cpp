@@ -6,6 +6,7 @@
 #include "gpu_fixture.h"
 #include "pages.h"
 
+#include <array>
 #include <atomic>
 #include <string_view>
 #include <thread>
@@ -69,6 +70,13 @@ TEST(VulkanFunctions, AreLoadedByManyThreadsAtOnce) {
     EXPECT_EQ(refused, 0u);
     EXPECT_EQ(wrong, 0u);
     EXPECT_TRUE(VulkanFunctions::load(loaderB, VK_NULL_HANDLE)) << "nobody holds the others any more";
+}
+
+TEST(VulkanFunctions, LibrariesThatAreNotThereArePassedBy) {
+    const std::array missing = {"libno_such_loader.so.1", "libno_such_loader.so"};
+    EXPECT_EQ(loaderOf(missing), nullptr);
+    EXPECT_EQ(loaderOf(std::array{missing[0], "libvulkan.so.1"}), vkGetInstanceProcAddr);
+    EXPECT_EQ(installedLoader(), vkGetInstanceProcAddr) << "what this program is linked with is the one installed";
 }
 
 using VulkanFunctionsGpu = test::GpuTest;

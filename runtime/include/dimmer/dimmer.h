@@ -177,6 +177,10 @@ void dimmer_lights_destroy(dimmer_lights* lights);
 dimmer_result dimmer_lights_set_weight(dimmer_lights* lights, uint32_t light_set, float weight);
 dimmer_result dimmer_lights_set_weight_rgb(dimmer_lights* lights, uint32_t light_set, float r, float g, float b);
 dimmer_result dimmer_lights_set_door(dimmer_lights* lights, uint32_t door, float open);
+/* From how far a door stands open to `open`, for the two common kinds: see door.h. NaN where an argument is, which
+ * dimmer_lights_set_door() refuses. */
+float dimmer_hinged_door_weight(float angle_rad, float angle_max_rad);
+float dimmer_sliding_door_weight(float travel_m, float width_m);
 /* Many at once, as text: "all=0,hall=0.5,alarm=1/0.2/0.2,door:front=1". */
 dimmer_result dimmer_lights_apply(dimmer_lights* lights, const char* state);
 /* What an update may leave for later: at most so many texels are written (0: all; the most visible come first), and
@@ -192,7 +196,10 @@ typedef struct dimmer_update_stats {
     uint64_t receivers; /* texels and probes written */
     uint64_t bytes_read, bytes_written;
     double host_us;
-    double gpu_us; /* by timestamps, from dimmer_lights_wait(); else 0 */
+    double gpu_us;              /* by timestamps, from dimmer_lights_wait(); else 0 */
+    uint32_t clusters_put_off;  /* by dimmer_lights_set_limits()'s tolerance_quanta */
+    uint64_t receivers_waiting; /* left for later updates by its receivers_max, at most */
+    uint64_t probes_resampled;  /* of models that move */
 } dimmer_update_stats;
 
 /* Blends what changed, on the CPU and before it returns. DIMMER_UNSUPPORTED for lights on Vulkan. */
@@ -265,9 +272,9 @@ typedef struct dimmer_vulkan {
     uint32_t queue_family; /* the queue's, and that of the command buffers given to dimmer_lights_record() */
     VkQueue compute_queue; /* optional: where dimmer_lights_submit() runs; VK_NULL_HANDLE: on `queue` */
     uint32_t compute_queue_family;
-    /* What Dimmer asks for Vulkan's functions, once, in create. NULL: the loader that it was linked with. An engine
-     * that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names of the
-     * functions. The functions are the process's: all lights that live at one time need the same ones. */
+    /* What Dimmer asks for Vulkan's functions, once, in create. NULL: the system's loader (libvulkan.so.1,
+     * vulkan-1.dll), which create opens then, and nothing before. An engine whose instance is another loader's gives
+     * that one's. The functions are the process's: all lights that live at one time need the same ones. */
     PFN_vkGetInstanceProcAddr get_instance_proc_addr;
     VkPipelineCache pipeline_cache; /* optional: create makes its pipelines with it */
 } dimmer_vulkan;
@@ -282,6 +289,10 @@ typedef struct dimmer_vulkan_options {
     dimmer_buffering buffering;
     uint32_t moving_probes_max; /* room for so many probes of models that move */
     uint32_t frames_in_flight;  /* updates that may be on their way at a time, 1 to 8; 0 is 1 */
+    /* Device memory for texels' records, in bytes; 0: room for all. Less needs start_without_records: then light sets
+     * are loaded and dropped as the game moves on. */
+    uint64_t records_bytes_max;
+    int start_without_records; /* not 0: every light set is held at 0 until dimmer_lights_load_records() brings it */
 } dimmer_vulkan_options;
 
 /* `options`: may be null. DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue and pipeline_cache may be), a
@@ -351,6 +362,30 @@ dimmer_result dimmer_lights_get_images(const dimmer_lights* lights, dimmer_image
 dimmer_result dimmer_lights_get_sets(const dimmer_lights* lights, uint32_t* page_set, uint32_t* probe_set);
 dimmer_result dimmer_lights_get_images_of_set(const dimmer_lights* lights, uint32_t page_set, dimmer_images* images);
 dimmer_result dimmer_lights_get_probes_of_set(const dimmer_lights* lights, uint32_t probe_set, VkBuffer* probes);
+
+/* Texels' records of a light set on the device. One whose records are not loaded is at 0 and refuses other weights. */
+typedef enum dimmer_records_state {
+    DIMMER_RECORDS_LOADED = 0,
+    DIMMER_RECORDS_LOADING = 1,
+    DIMMER_RECORDS_DROPPED = 2
+} dimmer_records_state;
+
+/* Off from now on, with the next update, and its memory is free for other sets. What was recorded before must have been
+ * submitted, and have completed where dimmer_lights_submit() has a queue of its own; or it never runs
+ * (dimmer_lights_discard_recorded()). */
+dimmer_result dimmer_lights_drop_records(dimmer_lights* lights, uint32_t light_set);
+/* Begins to bring them (back); dimmer_lights_continue_loading() does it, and then the set takes any weight.
+ * DIMMER_OUT_OF_MEMORY: no free range of records_bytes_max is long enough; nothing was changed. */
+dimmer_result dimmer_lights_load_records(dimmer_lights* lights, uint32_t light_set);
+dimmer_result dimmer_lights_get_records_state(const dimmer_lights* lights, uint32_t light_set,
+                                              dimmer_records_state* state);
+/* Of the memory for records: what a light set's take, and what no set's do. */
+dimmer_result dimmer_lights_get_record_bytes(const dimmer_lights* lights, uint32_t light_set, uint64_t* set_bytes,
+                                             uint64_t* free_bytes);
+/* Once a frame: copies a piece of at most so many bytes (and 4 MiB; 0: that) and never waits. Of all that was asked for
+ * since nothing was loading, `done_bytes` of `total_bytes` are there; either may be null. Equal: all is loaded. */
+dimmer_result dimmer_lights_continue_loading(dimmer_lights* lights, uint64_t bytes_max, uint64_t* done_bytes,
+                                             uint64_t* total_bytes);
 
 #endif
 

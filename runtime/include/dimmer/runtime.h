@@ -22,9 +22,9 @@ struct VulkanContext {
     // images and buffers are shared concurrently between the two families, and no third may use them).
     VkQueue compute_queue = VK_NULL_HANDLE;
     uint32_t compute_queue_family = 0;
-    // What the runtime asks for Vulkan's functions, once, in create(). Null: the loader that it was linked with. An
-    // engine that loads Vulkan by itself (volk, SDL) gives its own, and must where it defines variables with the names
-    // of the functions. The functions are the process's: all runtimes that live at one time need the same ones.
+    // What the runtime asks for Vulkan's functions, once, in create(). Null: the system's loader (libvulkan.so.1,
+    // vulkan-1.dll), which create() opens then, and nothing before. An engine whose instance is another loader's gives
+    // that one's. The functions are the process's: all runtimes that live at one time need the same ones.
     PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
     // Optional: create() makes its pipelines, up to 25 small ones, with it. Synchronised as it was made to be.
     VkPipelineCache pipeline_cache = VK_NULL_HANDLE;
