@@ -1,6 +1,7 @@
-// dimmer-sample: a small game without a player. Arguments in, exit code out; the work is in player.cpp.
+// dimmer-sample: a small game. Arguments in, exit code out; the work is in window_player.cpp and player.cpp.
 #include "balls.h"
 #include "player.h"
+#include "window_player.h"
 
 #include <dimmer/version.h>
 #include <fcntl.h>
@@ -24,7 +25,7 @@ using namespace dimmer::sample;
 constexpr int exit_done = 0, exit_fault = 1, exit_bad_input = 2;
 
 struct Arguments {
-    std::string pack, script, out = "out/sample", size, camera;
+    std::string pack, script, out = "out/sample", size, camera, picture;
     uint32_t frames = 0;
     bool headless = false, validate = false, no_self_visibility = false;
 };
@@ -32,12 +33,15 @@ struct Arguments {
 void declare(CLI::App& app, Arguments& arguments) {
     app.add_option("pack", arguments.pack, "The cooked level (*.dimmer)")->required();
     app.add_option("--script", arguments.script,
-                   "What to play: a text file, see demo.script (default: one frame, every light set at 1)");
-    app.add_flag("--headless", arguments.headless, "Write pictures instead of opening a window (the only mode so far)");
-    app.add_option("--out", arguments.out, "Folder for frame_0000.png ... and cost.json; made when missing")
+                   "What to play: a text file, see demo.script (default: nothing, every light set at 1)");
+    app.add_flag("--headless", arguments.headless,
+                 "Play into pictures, frame_0000.png ... and cost.json in --out, instead of a window");
+    app.add_option("--out", arguments.out, "Folder for pictures (a window's: those taken by F12); made when missing")
         ->capture_default_str();
-    app.add_option("--frames", arguments.frames, "Number of frames (default: the script's)")
+    app.add_option("--frames", arguments.frames,
+                   "Number of frames (default: the script's; in a window: until it is closed)")
         ->check(CLI::Range(1u, frame_count_max));
+    app.add_option("--picture", arguments.picture, "Of a window with --frames: what it shows at the end, as PNG");
     app.add_option("--size", arguments.size, "Picture size in pixels, WxH (default: the script's, else 960x540)");
     app.add_option("--camera", arguments.camera,
                    "Name of the camera to begin with (default: the script's, else the level's first)");
@@ -46,7 +50,10 @@ void declare(CLI::App& app, Arguments& arguments) {
                  "Light models by their light grids alone, without their shadows on themselves");
     app.set_version_flag("--version", "dimmer-sample " DIMMER_VERSION);
     app.footer(
-        "Example: dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
+        "Without --headless a window opens: W A S D Q E fly, the right mouse button looks, Shift hurries; a panel has\n"
+        "every light set and door, what each change costs, and limits; F1 hides it, F12 takes a picture, Esc quits.\n"
+        "Examples: dimmer-sample house.dimmer\n"
+        "          dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
 }
 
@@ -125,31 +132,50 @@ Expected<Script> prepareScript(const Arguments& arguments, const Pack& pack) {
     return script;
 }
 
+int finish(const std::vector<std::string>& validation_messages, int exit_code) {
+    for (const std::string& message : validation_messages) say("validation: " + message);
+    return validation_messages.empty() ? exit_code : exit_fault;
+}
+
+int runInWindow(const Arguments& arguments, const Pack& pack, const Script& script) {
+    const auto messages = playInWindow(pack, script,
+                                       {.pack = arguments.pack,
+                                        .out = arguments.out,
+                                        .has_script = !arguments.script.empty(),
+                                        .frames = arguments.frames,
+                                        .picture = arguments.picture,
+                                        .validate = arguments.validate,
+                                        .self_visibility = !arguments.no_self_visibility});
+    return messages ? finish(*messages, exit_done) : report(messages.error());
+}
+
+int runHeadless(const Arguments& arguments, const Pack& pack, const Script& script) {
+    const auto played =
+        playHeadless(pack, script, {arguments.pack, arguments.out, arguments.validate, !arguments.no_self_visibility});
+    if (!played) return report(played.error());
+    const std::string table = played->cost.table(played->device, played->driver);
+    const bool printed = std::fputs(table.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
+    return finish(played->validation_messages,
+                  printed ? exit_done : report({ErrorCode::Io, "the output could not be written"}));
+}
+
 int run(const Arguments& arguments) {
-    if (!arguments.headless) {
-        say("dimmer-sample: there is no window yet; add --headless to write pictures to the folder --out.");
-        return exit_bad_input;
-    }
+    if (!arguments.picture.empty() && (arguments.headless || arguments.frames == 0))
+        return report({ErrorCode::InvalidArgument, "--picture is of a window with --frames; not with --headless"});
     const auto pack = Pack::open(arguments.pack);
     if (!pack) return report(pack.error());
     const auto script = prepareScript(arguments, *pack);
     if (!script) return report(script.error());
-    const auto played = playHeadless(
-        *pack, *script, {arguments.pack, arguments.out, arguments.validate, !arguments.no_self_visibility});
-    if (!played) return report(played.error());
-
-    const std::string table = played->cost.table(played->device, played->driver);
-    const bool printed = std::fputs(table.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
-    for (const std::string& message : played->validation_messages) say("validation: " + message);
-    if (!played->validation_messages.empty()) return exit_fault;
-    return printed ? exit_done : report({ErrorCode::Io, "the output could not be written"});
+    return arguments.headless ? runHeadless(arguments, *pack, *script) : runInWindow(arguments, *pack, *script);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
     keepWorkingUnheard();
-    CLI::App app("Plays a script of light switches on a cooked level and writes what one sees, with what it cost.");
+    CLI::App app(
+        "A small game on a cooked level: switch its lights by hand in a window, or play a script of switches into "
+        "pictures.");
     Arguments arguments;
     declare(app, arguments);
     try {

@@ -5,7 +5,7 @@ packages=(
     libvulkan-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools spirv-tools
     libglm-dev libembree-dev libtbb-dev libzstd-dev libxxhash-dev
     libtinygltf-dev nlohmann-json3-dev libstb-dev libopenexr-dev libcli11-dev libfmt-dev
-    libtet1.5-dev libmeshoptimizer-dev
+    libtet1.5-dev libmeshoptimizer-dev libsdl2-dev libimgui-dev
     libgtest-dev libgmock-dev  # CMake looks for all that its targets need, whichever is built
 )
 bench_packages=(libbenchmark-dev)

@@ -53,7 +53,7 @@ TEST_F(Streams, ExitCodesStayWithoutStderr) {
         EXPECT_EQ(redirected({"inspect", "--nonsense"}, redirection).exit_code, 2) << redirection;
         EXPECT_EQ(redirected({"cokk"}, redirection).exit_code, 2) << redirection;
         EXPECT_EQ(redirected({"--help"}, redirection).exit_code, 0) << redirection;
-        EXPECT_EQ(redirected({pack()}, redirection, DIMMER_SAMPLE_TOOL).exit_code, 2) << redirection;
+        EXPECT_EQ(redirected({file("none.dimmer")}, redirection, DIMMER_SAMPLE_TOOL).exit_code, 2) << redirection;
         // A note about the point goes to stderr.
         const auto sampled = redirected({"sample", pack(), "--points", far}, redirection);
         EXPECT_EQ(sampled.exit_code, 0) << redirection;
