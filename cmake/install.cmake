@@ -3,9 +3,9 @@ include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
 set(package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/dimmer)
-# Engines' modules are shared libraries.
-set_target_properties(dimmer_runtime PROPERTIES EXPORT_NAME runtime POSITION_INDEPENDENT_CODE ON)
-install(TARGETS dimmer_runtime EXPORT dimmer_targets ARCHIVE COMPONENT runtime)
+set_target_properties(dimmer_runtime PROPERTIES EXPORT_NAME runtime)
+install(TARGETS dimmer_runtime EXPORT dimmer_targets ARCHIVE COMPONENT runtime
+    INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(DIRECTORY runtime/include/ shaders/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT runtime)
 install(EXPORT dimmer_targets NAMESPACE dimmer:: DESTINATION ${package_dir} COMPONENT runtime)
 

@@ -14,10 +14,6 @@ namespace {
 constexpr std::string_view player_start = "player_start";
 constexpr float near_m = 0.05f, far_m = 500.0f;
 
-CameraPose pose(const Viewpoint& viewpoint) {
-    return {toVec3(viewpoint.position_m), toVec3(viewpoint.forward), viewpoint.vertical_fov_rad};
-}
-
 CameraPose cornerOfBounds(const Pack& pack) {
     glm::vec3 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
     for (const Mesh& mesh : pack.meshes())
@@ -34,10 +30,14 @@ CameraPose cornerOfBounds(const Pack& pack) {
 
 }  // namespace
 
+CameraPose poseOf(const Viewpoint& viewpoint) {
+    return {toVec3(viewpoint.position_m), toVec3(viewpoint.forward), viewpoint.vertical_fov_rad};
+}
+
 Expected<CameraPose> findCamera(const Pack& pack, std::string_view name) {
     std::string names;
     for (const Viewpoint& viewpoint : pack.viewpoints()) {
-        if (viewpoint.name == name) return pose(viewpoint);
+        if (viewpoint.name == name) return poseOf(viewpoint);
         names += (names.empty() ? "" : ", ") + viewpoint.name;
     }
     return fail(ErrorCode::NotFound, fmt::format("The pack has no camera \"{}\". It has: {}.", name,
@@ -48,8 +48,8 @@ CameraPose defaultCamera(const Pack& pack) {
     const auto viewpoints = pack.viewpoints();
     const auto camera =
         std::find_if(viewpoints.begin(), viewpoints.end(), [](const auto& v) { return v.name != player_start; });
-    if (camera != viewpoints.end()) return pose(*camera);
-    return viewpoints.empty() ? cornerOfBounds(pack) : pose(viewpoints.front());
+    if (camera != viewpoints.end()) return poseOf(*camera);
+    return viewpoints.empty() ? cornerOfBounds(pack) : poseOf(viewpoints.front());
 }
 
 CameraPose blend(const CameraPose& from, const CameraPose& to, float t) {

@@ -23,6 +23,8 @@ struct CameraPose {
 // The viewpoint of that name; NotFound lists those that there are.
 Expected<CameraPose> findCamera(const Pack& pack, std::string_view name);
 
+CameraPose poseOf(const Viewpoint& viewpoint);
+
 // Where to look from when nobody says: the first camera of the level, else its player_start, else from a corner of the
 // level's bounds towards its middle.
 CameraPose defaultCamera(const Pack& pack);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer::sample {
 namespace {
@@ -39,6 +40,22 @@ void Controls::setTint(uint32_t set, const Tint& tint) {
     (void)lights_.setWeight(LightSet{set}, weightOf(set, tint));
 }
 
+void Controls::setAll(bool on) {
+    const auto elements = lights_.pack().elements();
+    for (uint32_t i = 0; i < elements.size(); ++i)
+        if (elements[i].kind == ElementKind::LightSet)
+            (void)lights_.setWeight(LightSet{i}, on ? weightAtFirst(elements[i]) : 0);
+}
+
+void Controls::setOpen(uint32_t door, float open) {
+    if (!std::isnan(open)) (void)lights_.setDoor(Door{door}, std::clamp(open, 0.0f, 1.0f));
+}
+
+float Controls::target(uint32_t door) const {
+    const auto moving = std::ranges::find(moving_, door, &Moving::door);
+    return moving == moving_.end() ? lights_.open(Door{door}) : moving->target;
+}
+
 void Controls::send(uint32_t door, float open) {
     std::erase_if(moving_, [&](const Moving& m) { return m.door == door; });
     moving_.push_back({door, std::clamp(open, 0.0f, 1.0f), lights_.open(Door{door})});
@@ -53,6 +70,21 @@ void Controls::step(float seconds) {
         (void)lights_.setDoor(Door{m.door}, m.last);
         return m.last == m.target;
     });
+}
+
+float weightAtFirst(const Element& element) {
+    return element.kind == ElementKind::Door ? 0 : std::min(1.0f, element.max_weight);
+}
+
+Expected<void> resetWeights(LightState& lights) {
+    const auto elements = lights.pack().elements();
+    for (uint32_t i = 0; i < elements.size(); ++i) {
+        const float weight = weightAtFirst(elements[i]);
+        const bool is_door = elements[i].kind == ElementKind::Door;
+        if (auto done = is_door ? lights.setDoor(Door{i}, weight) : lights.setWeight(LightSet{i}, weight); !done)
+            return done;
+    }
+    return {};
 }
 
 std::string Controls::text() const {

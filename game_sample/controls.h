@@ -25,6 +25,13 @@ class Controls {
     // What is beyond the set's maximum is cut off.
     void setTint(uint32_t set, const Tint& tint);
 
+    // All sets at once.
+    void setAll(bool on);
+
+    // Clamped; NaN is passed by.
+    void setOpen(uint32_t door, float open);
+    // Where the door goes, or is.
+    float target(uint32_t door) const;
     // The door goes there by itself, in a second from end to end, until somebody else moves it.
     void send(uint32_t door, float open);
     void step(float seconds);
@@ -44,5 +51,9 @@ class Controls {
     std::vector<Tint> last_;  // per element
     std::vector<Moving> moving_;
 };
+
+// What an element has at the beginning: a set 1 or its maximum, a door 0.
+float weightAtFirst(const Element& element);
+Expected<void> resetWeights(LightState& lights);
 
 }  // namespace dimmer::sample

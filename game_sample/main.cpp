@@ -41,7 +41,9 @@ void declare(CLI::App& app, Arguments& arguments) {
     app.add_option("--frames", arguments.frames,
                    "Number of frames (default: the script's; in a window: until it is closed)")
         ->check(CLI::Range(1u, frame_count_max));
-    app.add_option("--picture", arguments.picture, "Of a window with --frames: what it shows at the end, as PNG");
+    app.add_option(
+        "--picture", arguments.picture,
+        "Of a window with --frames (from 2 on: panels need one to be laid out): what it shows at the end, as PNG");
     app.add_option("--size", arguments.size, "Picture size in pixels, WxH (default: the script's, else 960x540)");
     app.add_option("--camera", arguments.camera,
                    "Name of the camera to begin with (default: the script's, else the level's first)");

@@ -10,10 +10,17 @@ namespace {
 
 constexpr float margin = 8, lights_width = 280, costs_width = 270, label_width = 90;
 
-// The rest of the line is for what follows.
+// Brighter than this nobody drags a slider; scripts may.
+constexpr float slider_max = 1000;
+
+// The rest of the line is for what follows; of a long name, what fits, and all of it under the mouse.
 void label(const char* name) {
     ImGui::AlignTextToFramePadding();
+    const ImVec2 at = ImGui::GetCursorScreenPos();
+    ImGui::PushClipRect(at, {at.x + label_width - 2 * margin, at.y + ImGui::GetFrameHeight()}, true);
     ImGui::TextUnformatted(name);
+    if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", name);
+    ImGui::PopClipRect();
     ImGui::SameLine(label_width);
 }
 
@@ -24,12 +31,12 @@ void drawSet(Controls& controls, const Element& element, uint32_t set) {
     label(element.name.c_str());
     bool on = tint.brightness > 0, changed = false;
     if (ImGui::Checkbox("##on", &on)) {
-        tint.brightness = on ? std::min(1.0f, element.max_weight) : 0;
+        tint.brightness = on ? weightAtFirst(element) : 0;
         changed = true;
     }
     ImGui::SameLine();
     ImGui::SetNextItemWidth(-60);
-    changed = ImGui::SliderFloat("##brightness", &tint.brightness, 0, element.max_weight, "%.2f",
+    changed = ImGui::SliderFloat("##brightness", &tint.brightness, 0, std::min(element.max_weight, slider_max), "%.3g",
                                  ImGuiSliderFlags_AlwaysClamp) ||
               changed;
     ImGui::SameLine();
@@ -41,40 +48,36 @@ void drawSet(Controls& controls, const Element& element, uint32_t set) {
     ImGui::PopID();
 }
 
-Expected<void> drawDoor(Controls& controls, Runtime& lights, const Element& element, uint32_t door) {
+void drawDoor(Controls& controls, const LightState& lights, const Element& element, uint32_t door) {
     ImGui::PushID(static_cast<int>(door));
     float open = lights.open(Door{door});
     label(element.name.c_str());
     ImGui::SetNextItemWidth(-60);
-    Expected<void> done{};
-    if (ImGui::SliderFloat("##open", &open, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp))
-        done = lights.setDoor(Door{door}, open);
+    if (ImGui::SliderFloat("##open", &open, 0, 1, "%.2f", ImGuiSliderFlags_AlwaysClamp)) controls.setOpen(door, open);
     ImGui::SameLine();
-    if (ImGui::Button(open > 0.5f ? "close" : "open", {-1, 0})) controls.send(door, open > 0.5f ? 0.0f : 1.0f);
+    const bool opens = controls.target(door) > 0.5f;
+    if (ImGui::Button(opens ? "close###send" : "open###send", {-1, 0})) controls.send(door, opens ? 0.0f : 1.0f);
     ImGui::PopID();
-    return done;
 }
 
-Expected<void> drawElements(Controls& controls, Runtime& lights) {
+void drawElements(Controls& controls, const LightState& lights) {
     const auto elements = lights.pack().elements();
-    const auto all = [&](ElementKind kind) {
+    const auto has = [&](ElementKind kind) {
         return std::ranges::any_of(elements, [&](const Element& e) { return e.kind == kind; });
     };
-    if (all(ElementKind::LightSet) && ImGui::CollapsingHeader("Light sets", ImGuiTreeNodeFlags_DefaultOpen)) {
+    if (has(ElementKind::LightSet) && ImGui::CollapsingHeader("Light sets", ImGuiTreeNodeFlags_DefaultOpen)) {
         for (uint32_t i = 0; i < elements.size(); ++i)
             if (elements[i].kind == ElementKind::LightSet) drawSet(controls, elements[i], i);
-        for (const auto& [text, state] : {std::pair{"all on", "all=1"}, std::pair{"all off", "all=0"}}) {
-            if (ImGui::Button(text)) (void)lights.apply(state);  // refused where a set's maximum is below 1
-            ImGui::SameLine();
-        }
+        if (ImGui::Button("all on")) controls.setAll(true);
+        ImGui::SameLine();
+        if (ImGui::Button("all off")) controls.setAll(false);
+        ImGui::SameLine();
         if (ImGui::Button("copy as text")) ImGui::SetClipboardText(controls.text().c_str());
-        if (ImGui::IsItemHovered()) ImGui::SetTooltip("for a script's \"at FRAME set\", --state, LightState::apply()");
+        if (ImGui::IsItemHovered()) ImGui::SetTooltip("for --state and LightState::apply()");
     }
-    if (all(ElementKind::Door) && ImGui::CollapsingHeader("Doors", ImGuiTreeNodeFlags_DefaultOpen))
+    if (has(ElementKind::Door) && ImGui::CollapsingHeader("Doors", ImGuiTreeNodeFlags_DefaultOpen))
         for (uint32_t i = 0; i < elements.size(); ++i)
-            if (elements[i].kind == ElementKind::Door)
-                if (auto done = drawDoor(controls, lights, elements[i], i); !done) return done;
-    return {};
+            if (elements[i].kind == ElementKind::Door) drawDoor(controls, lights, elements[i], i);
 }
 
 void drawCosts(const CostHistory& costs) {
@@ -102,34 +105,45 @@ void drawCosts(const CostHistory& costs) {
     plot("GPU", costs.gpu_us);
 }
 
-Expected<void> drawLimits(Panels& panel, Runtime& lights) {
-    if (!ImGui::CollapsingHeader("Limits")) return {};
-    int receivers = static_cast<int>(std::min(panel.limits.receivers_max, 1'000'000u));
+void drawLimits(Panels& panels, Runtime& lights) {
+    if (!ImGui::CollapsingHeader("Limits")) return;
+    UpdateLimits wanted = panels.limits;
+    int receivers = static_cast<int>(wanted.receivers_max);
+    constexpr int receivers_most = 1'000'000;
     label("texels");
     ImGui::SetNextItemWidth(-1);
-    bool changed = ImGui::SliderInt("##texels", &receivers, 0, 1'000'000, receivers == 0 ? "all" : "%d",
-                                    ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
+    ImGui::SliderInt("##texels", &receivers, 0, receivers_most, receivers == 0 ? "all" : "%d",
+                     ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
     label("tolerance");
     ImGui::SetNextItemWidth(-1);
-    changed = ImGui::SliderFloat("##tolerance", &panel.limits.tolerance_quanta, 0, 8, "%.1f steps",
-                                 ImGuiSliderFlags_AlwaysClamp) ||
-              changed;
-    panel.limits.receivers_max = static_cast<uint32_t>(receivers);
-    return changed ? lights.setLimits(panel.limits) : Expected<void>{};
+    ImGui::SliderFloat("##tolerance", &wanted.tolerance_quanta, 0, 8, "%.1f steps", ImGuiSliderFlags_AlwaysClamp);
+    wanted.receivers_max = static_cast<uint32_t>(std::clamp(receivers, 0, receivers_most));
+    if (wanted == panels.limits) return;
+    if (const auto done = lights.setLimits(wanted))
+        panels.limits = wanted;
+    else
+        panels.message = done.error().message;
 }
 
-void drawView(Panels& panel, const Pack& pack) {
-    if (!ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) return;
+std::optional<CameraPose> drawView(Panels& panels, const Pack& pack) {
+    std::optional<CameraPose> chosen;
+    if (!ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) return chosen;
     label("speed");
     ImGui::SetNextItemWidth(-1);
-    ImGui::SliderFloat("##speed", &panel.faster, 0.1f, 10, "%.1f", ImGuiSliderFlags_Logarithmic);
-    for (const Viewpoint& viewpoint : pack.viewpoints()) {
-        if (ImGui::Button(viewpoint.name.c_str()))
-            if (const auto pose = findCamera(pack, viewpoint.name)) panel.look_from = *pose;
-        const float next = ImGui::GetItemRectMax().x + 100;
-        if (next < ImGui::GetWindowPos().x + ImGui::GetWindowWidth()) ImGui::SameLine();
+    ImGui::SliderFloat("##speed", &panels.faster, 0.1f, 10, "%.1f",
+                       ImGuiSliderFlags_AlwaysClamp | ImGuiSliderFlags_Logarithmic);
+    const auto viewpoints = pack.viewpoints();
+    const float end = ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x;
+    const ImGuiStyle& style = ImGui::GetStyle();
+    for (size_t i = 0; i < viewpoints.size(); ++i) {
+        const std::string& name = viewpoints[i].name;
+        const float width = ImGui::CalcTextSize(name.c_str()).x + 2 * style.FramePadding.x;
+        if (i > 0 && ImGui::GetItemRectMax().x + style.ItemSpacing.x + width < end) ImGui::SameLine();
+        ImGui::PushID(static_cast<int>(i));
+        if (ImGui::Button((name + "###view").c_str())) chosen = poseOf(viewpoints[i]);
+        ImGui::PopID();
     }
-    ImGui::NewLine();
+    return chosen;
 }
 
 }  // namespace
@@ -142,20 +156,19 @@ void CostHistory::add(const UpdateStats& stats) {
     if (stats.clusters > 0) last_change = stats;
 }
 
-Expected<void> drawPanels(Panels& panels, Controls& controls, Runtime& lights) {
-    panels.look_from.reset();
-    panels.restart = false;
+PanelRequests drawPanels(Panels& panels, Controls& controls, Runtime& lights) {
+    PanelRequests requests;
     const ImVec2 size = ImGui::GetIO().DisplaySize;
     constexpr ImGuiWindowFlags flags = ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoMove;
     ImGui::SetNextWindowPos({margin, margin});
     ImGui::SetNextWindowSizeConstraints({lights_width, 0}, {lights_width, size.y - 2 * margin});
-    ImGui::Begin(panels.level.c_str(), nullptr, flags);
+    ImGui::Begin((panels.level + "###lights").c_str(), nullptr, flags);
     if (panels.has_script) {
         ImGui::Checkbox("script", &panels.script_runs);
         ImGui::SameLine();
-        panels.restart = ImGui::Button("from the start");
+        requests.restart = ImGui::Button("from the start");
     }
-    auto done = drawElements(controls, lights);
+    drawElements(controls, lights);
     ImGui::End();
 
     ImGui::SetNextWindowPos({size.x - margin, margin}, ImGuiCond_Always, {1, 0});
@@ -163,11 +176,12 @@ Expected<void> drawPanels(Panels& panels, Controls& controls, Runtime& lights) {
     ImGui::Begin(fmt::format("{:.0f} frames/s###costs", ImGui::GetIO().Framerate).c_str(), nullptr, flags);
     ImGui::TextWrapped("%s", panels.device.c_str());
     drawCosts(panels.costs);
-    if (done) done = drawLimits(panels, lights);
-    drawView(panels, lights.pack());
+    drawLimits(panels, lights);
+    requests.look_from = drawView(panels, lights.pack());
     ImGui::TextDisabled("W A S D Q E, right mouse button: fly\nF1 panels, F12 picture, Esc quits");
+    if (!panels.message.empty()) ImGui::TextWrapped("%s", panels.message.c_str());
     ImGui::End();
-    return done;
+    return requests;
 }
 
 }  // namespace dimmer::sample

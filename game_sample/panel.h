@@ -23,19 +23,23 @@ class CostHistory {
     std::array<float, 240> host_us{}, gpu_us{};
 };
 
-// What the panels show, and what a person asks for by them.
+// What the panels show, and what a person sets by them.
 struct Panels {
     CostHistory costs;
     std::string device, level;
+    std::string message;  // the last one
     bool has_script = false, script_runs = false;
     UpdateLimits limits;
     float faster = 1;  // of the camera
+};
 
-    std::optional<CameraPose> look_from;  // asked for in this frame
-    bool restart = false;                 // likewise
+// What a person asks for in one frame.
+struct PanelRequests {
+    std::optional<CameraPose> look_from;
+    bool restart = false;
 };
 
 // Within a frame of Dear ImGui.
-Expected<void> drawPanels(Panels& panels, Controls& controls, Runtime& lights);
+PanelRequests drawPanels(Panels& panels, Controls& controls, Runtime& lights);
 
 }  // namespace dimmer::sample

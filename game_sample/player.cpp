@@ -22,7 +22,7 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
     {
         auto stage = Stage::create(*device, pack, script, options.self_visibility);
         if (!stage) return std::unexpected(stage.error());
-        DIMMER_TRY((*stage)->rehearse());
+        DIMMER_TRY((*stage)->rehearse(script.frames));
         Timeline timeline(script);
         AutoExposure eye(script.adaptation_s, script.fps);
         Progress progress("frames", script.frames);

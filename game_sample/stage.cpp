@@ -1,5 +1,6 @@
 #include "stage.h"
 
+#include "controls.h"
 #include "timeline.h"
 
 #include <gpu/vk_result.h>
@@ -96,9 +97,9 @@ Expected<void> Stage::submitAndWait() {
     return {};
 }
 
-Expected<void> Stage::rehearse() {
+Expected<void> Stage::rehearse(uint32_t frames) {
     Timeline timeline(script_);
-    for (uint32_t frame = 0; frame < script_.frames; ++frame) {
+    for (uint32_t frame = 0; frame < frames; ++frame) {
         const auto changes = timeline.advance(frame, lights_);
         if (!changes) return std::unexpected(changes.error());
         DIMMER_TRY(balls_.move(frame, lights_));
@@ -107,16 +108,6 @@ Expected<void> Stage::rehearse() {
     DIMMER_TRY(resetWeights(lights_));
     if (const auto sent = lights_.submit(); !sent) return std::unexpected(sent.error());
     if (const auto done = lights_.wait(); !done) return std::unexpected(done.error());
-    return {};
-}
-
-Expected<void> resetWeights(LightState& lights) {
-    const auto elements = lights.pack().elements();
-    for (uint32_t i = 0; i < elements.size(); ++i) {
-        const bool is_door = elements[i].kind == ElementKind::Door;
-        const float shining = std::min(1.0f, elements[i].max_weight);
-        DIMMER_TRY(is_door ? lights.setDoor(Door{i}, 0) : lights.setWeight(LightSet{i}, shining));
-    }
     return {};
 }
 

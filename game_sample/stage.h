@@ -26,9 +26,9 @@ class Stage {
     Expected<UpdateStats> draw(uint32_t frame, const CameraPose& camera);
     // The last one drawn.
     RadianceFrame read() const { return renderer_.read(); }
-    // The script's light without a picture, and back to the beginning. Drivers compile a kernel when it first runs; so
-    // they have done it before anything is measured.
-    Expected<void> rehearse();
+    // The light of so many of the script's frames without a picture, and back to the beginning. Drivers compile a
+    // kernel when it first runs; so they have done it before anything is measured.
+    Expected<void> rehearse(uint32_t frames);
 
    private:
     // One command buffer, recorded anew for each frame.
@@ -61,8 +61,5 @@ class Stage {
     std::optional<SphereRenderer> sphere_renderer_;  // none where the script has nothing to draw with it
     std::vector<Sphere> probe_spheres_;
 };
-
-// Every weight as it was at the beginning: sets at 1 or their maximum, doors closed.
-Expected<void> resetWeights(LightState& lights);
 
 }  // namespace dimmer::sample

@@ -81,6 +81,7 @@ Expected<std::unique_ptr<Window>> Window::create(const std::string& title, uint3
 }
 
 Expected<void> Window::Impl::create(const std::string& title) {
+    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");  // Ctrl-C ends the sample at once, whatever it is at
     if (SDL_Init(SDL_INIT_VIDEO) != 0) return sdlError(ErrorCode::InvalidArgument, no_display);
     library.video = true;
     // What SDL falls back on where there is no display shows nothing, and nobody could close it.
@@ -121,10 +122,16 @@ WindowInput Window::begin() {
     for (SDL_Event event; SDL_PollEvent(&event);) {
         ImGui_ImplSDL2_ProcessEvent(&event);
         const bool key = event.type == SDL_KEYDOWN && event.key.repeat == 0 && !io.WantTextInput;
-        if (event.type == SDL_QUIT || (key && event.key.keysym.sym == SDLK_ESCAPE)) input.quit = true;
+        // A picker that is open takes Esc for itself.
+        const bool popup = ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
+        if (event.type == SDL_QUIT || (key && event.key.keysym.sym == SDLK_ESCAPE && !popup)) input.quit = true;
         if (key && event.key.keysym.sym == SDLK_F1) input.toggle_panel = true;
         if (key && event.key.keysym.sym == SDLK_F12) input.picture = true;
-        if (event.type == SDL_MOUSEMOTION && (event.motion.state & SDL_BUTTON_RMASK))
+        if (event.type == SDL_MOUSEBUTTONDOWN && event.button.button == SDL_BUTTON_RIGHT && !io.WantCaptureMouse)
+            SDL_SetRelativeMouseMode(SDL_TRUE);
+        if (event.type == SDL_MOUSEBUTTONUP && event.button.button == SDL_BUTTON_RIGHT)
+            SDL_SetRelativeMouseMode(SDL_FALSE);
+        if (event.type == SDL_MOUSEMOTION && SDL_GetRelativeMouseMode())
             input.fly.turn_rad += radians_per_pixel * glm::vec2(event.motion.xrel, -event.motion.yrel);
     }
     if (!io.WantTextInput) {

@@ -1,5 +1,5 @@
 // A window that shows a picture and, above it, what Dear ImGui draws; by SDL's own renderer, so that it opens wherever
-// SDL draws, with any Vulkan device or none.
+// SDL draws, whichever Vulkan device made the picture.
 #pragma once
 
 #include "fly_camera.h"

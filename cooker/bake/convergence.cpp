@@ -90,8 +90,8 @@ double Acceleration::eigenvalueOf(double ratio, int channel) const {
     return foci > 0 ? foci * std::cosh(std::max(0.0, std::log(ratio) + std::acosh(1 / foci))) : ratio;
 }
 
-Convergence::Convergence(const Gatherer& gatherer, const Acceleration& pace)
-    : gatherer_(gatherer), paths_(gatherer.paths()), pace_(pace), groups_(paths_.groupCount()) {}
+Convergence::Convergence(const DoorPaths& paths, std::span<const float> areas_m2, const Acceleration& pace)
+    : paths_(paths), areas_m2_(areas_m2), pace_(pace), groups_(paths.groupCount()) {}
 
 // Floors: a share of each group's mean over the area that has light of it.
 void Convergence::begin(const SparseLight& light) {
@@ -104,8 +104,8 @@ void Convergence::begin(const SparseLight& light) {
                 const size_t group = paths_.group(l.term);
                 const float lux = luminance(std::exchange(there[group], glm::vec3(0)));
                 if (!(lux > 0)) continue;
-                sum.of[2 * group] += static_cast<double>(gatherer_.areaM2(i));
-                sum.of[2 * group + 1] += static_cast<double>(gatherer_.areaM2(i) * lux);
+                sum.of[2 * group] += static_cast<double>(areas_m2_[i]);
+                sum.of[2 * group + 1] += static_cast<double>(areas_m2_[i] * lux);
             }
         }
     });
@@ -117,8 +117,8 @@ void Convergence::begin(const SparseLight& light) {
 Convergence::Part::Part(const Convergence& of, Sums& sums)
     : of_(of), sums_(sums), there_lux_(of.groups_.size()), in_block_(of.paths_.termCount()) {}
 
-void Convergence::Part::addRow(size_t receiver, std::span<const Change> row) {
-    const auto area_m2 = static_cast<double>(of_.gatherer_.areaM2(receiver));
+void Convergence::Part::addRow(size_t place, std::span<const Change> row) {
+    const auto area_m2 = static_cast<double>(of_.areas_m2_[place]);
     for (const Change& c : row) there_lux_[of_.paths_.group(c.term)] += c.gets_lux;
     for (const Change& c : row) {
         const size_t group = of_.paths_.group(c.term);

@@ -48,12 +48,12 @@ class Acceleration {
 // How far each light group is from its end, from what a bounce would change. Light counts as a share of what is there:
 // what lies in a dim room as well as what the sun lights. Each channel by itself: what red walls do to a light dies
 // down later than what they do to the blue in it. What rounding does (TermLight) is told apart by adding up: over the
-// whole group, and over each block of receivers, which are neighbours, where the whole may not see too much light here
+// whole group, and over each block of rows, which are neighbours, where the whole may not see too much light here
 // and too little there.
 class Convergence {
    public:
-    // `pace`: at which rounds go.
-    Convergence(const Gatherer& gatherer, const Acceleration& pace);
+    // Of light at places of these areas. `pace`: at which rounds go.
+    Convergence(const DoorPaths& paths, std::span<const float> areas_m2, const Acceleration& pace);
 
     struct Change {
         uint32_t term;
@@ -63,7 +63,7 @@ class Convergence {
     class Part {
        public:
         Part(const Convergence& of, Sums& sums);
-        void addRow(size_t receiver, std::span<const Change> row);
+        void addRow(size_t place, std::span<const Change> row);
         void closeBlock();
 
        private:
@@ -104,8 +104,8 @@ class Convergence {
         glm::vec3 floor_lux{0};
     };
 
-    const Gatherer& gatherer_;
     const DoorPaths& paths_;
+    std::span<const float> areas_m2_;
     Acceleration pace_;
     std::vector<Flux> groups_;
 };

@@ -6,6 +6,7 @@
 #include <bake/door_pairs.h>
 #include <bake/final_gather.h>
 #include <bake/links.h>
+#include <bake/receiver_blocks.h>
 #include <bake/sampling.h>
 #include <bake/sums.h>
 
@@ -66,7 +67,7 @@ class Expansion {
         directPass(UINT32_MAX);
         out_.doors_near = doorsNear(links_, doors_seen_);
         bounce();
-        out_.radiance = outgoing(out_.bounced, true);
+        out_.radiance = leavingReceivers(out_.bounced);
         activity_.decide(out_);
         out_.rays = rays_traced_;
         out_.doors_seen = std::move(doors_seen_);
@@ -172,23 +173,29 @@ class Expansion {
 
     bool runs(uint32_t term) const { return running_[paths_.terms()[term].group] != 0; }
 
-    // What leaves each receiver: rho / pi * (direct + bounced so far), of the groups that still run or of all.
-    SparseLight outgoing(const SparseLight& bounced, bool all) const {
-        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+    // What leaves each of `count` places: rho / pi * (direct + bounced so far), of the groups that still run or of all.
+    SparseLight outgoing(size_t count, const SparseLight& direct, const SparseLight& bounced, bool all,
+                         auto&& reflectance, auto&& condition, Rounding::Of rounding) const {
+        return SparseLight::build(count, [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
-                const glm::vec3 reflect = gatherer_.reflectance(i) / pi;
-                const uint32_t own = gatherer_.conditionOf(i);
-                for (const auto* part : {&out_.direct, &bounced})
+                const glm::vec3 reflect = reflectance(i) / pi;
+                const uint32_t own = condition(i);
+                for (const auto* part : {&direct, &bounced})
                     for (const TermLight& l : part->row(i)) {
                         const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
                         if (term != no_term) sum[term] += reflect * l.value();
                     }
-                takeRow(sum, Rounding(i, Rounding::Of::Outgoing), row);
+                takeRow(sum, Rounding(i, rounding), row);
                 emit(std::span<const TermLight>(row));
             }
         });
+    }
+    SparseLight leavingReceivers(const SparseLight& bounced) const {
+        return outgoing(
+            receivers_, out_.direct, bounced, true, [&](size_t i) { return gatherer_.reflectance(i); },
+            [&](size_t i) { return gatherer_.conditionOf(i); }, Rounding::Of::Outgoing);
     }
 
     struct Sum {
@@ -199,29 +206,30 @@ class Expansion {
         glm::vec3 operator*(float s) const { return glm::vec3(light[0], light[1], light[2]) * s; }
     };
 
-    // One more bounce along the links, of the groups that still run: `weight` of the way to it from what was there
-    // before `bounced`, see Acceleration; of the others, what `bounced` has. Empties `previous`, block by block.
-    SparseLight follow(const SparseLight& radiance, const SparseLight& bounced, SparseLight& previous, glm::vec3 weight,
+    // One more bounce between blocks, of the groups that still run: `weight` of the way to it from what was there
+    // before `bounced`, see Acceleration; of the others, what `bounced` has. Empties `previous`, rows by rows.
+    SparseLight follow(const ReceiverBlocks& blocks, const Links& links, const SparseLight& radiance,
+                       const SparseLight& bounced, SparseLight& previous, glm::vec3 weight,
                        Convergence& convergence) const {
         const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
-        SparseLight::Builder next(receivers_);
+        SparseLight::Builder next(blocks.size());
         convergence.begin(bounced);
-        const auto followBlocks = [&](size_t first, size_t last, Sums& sums) {
+        const auto followRows = [&](size_t first, size_t last, Sums& sums) {
             TermAccumulator<Sum> sum(terms_);
             std::vector<TermLight> row;
-            std::vector<Link> links;
+            std::vector<Link> own_links;
             std::vector<Convergence::Change> changes;
             Convergence::Part part(convergence, sums);
-            for (size_t i = first * rows_per_block; i < std::min(last * rows_per_block, receivers_); ++i) {
-                links_.get(i, links);
-                addArriving(radiance, links, gatherer_.conditionOf(i), sum);
+            for (size_t i = first * rows_per_block; i < std::min(last * rows_per_block, blocks.size()); ++i) {
+                links.get(i, own_links);
+                addArriving(radiance, own_links, blocks.condition(i), sum);
                 row.clear();
                 changes.clear();
-                const Rounding rounding(i, Rounding::Of::Bounced);
+                const Rounding rounding(i, Rounding::Of::BlockBounced);
                 TermsInOrder before(previous.row(i)), now(bounced.row(i));
                 for (const uint32_t t : sum.touched()) {
                     const glm::vec3 lux = sum[t] * lux_per_radiance;
-                    if (!least_.empty() && luminance(lux) < least_[t]) continue;  // nor does it count as a change
+                    if (isLetGo(t, lux)) continue;  // nor does it count as a change
                     const glm::vec3 had = before.of(t);
                     row.emplace_back(t, had + weight * (lux - had), rounding);
                     changes.push_back({t, now.of(t), lux});
@@ -233,16 +241,40 @@ class Expansion {
                     if (!runs(l.term)) row.push_back(l);
                 if (row.size() > followed) std::ranges::sort(row, {}, term_of);
                 next.put(i, row);
-                const bool block_ends = (i + 1) % rows_per_block == 0 || i + 1 == receivers_;
-                if (!block_ends) continue;
+                const bool rows_end = (i + 1) % rows_per_block == 0 || i + 1 == blocks.size();
+                if (!rows_end) continue;
                 next.close(i / rows_per_block * rows_per_block);
                 previous.dropBlock(i);
                 part.closeBlock();
             }
         };
-        convergence.end(sumOverRows(blockCount(receivers_), convergence.none(), followBlocks), running_);
+        convergence.end(sumOverRows(blockCount(blocks.size()), convergence.none(), followRows), running_);
         return next.finish();
     }
+
+    // The last bounce, from receiver to receiver.
+    SparseLight followOnce(const SparseLight& radiance) const {
+        const float lux_per_radiance = pi / static_cast<float>(settings_.series_rays);
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+            TermAccumulator<Sum> sum(terms_);
+            std::vector<TermLight> row;
+            std::vector<Link> links;
+            for (size_t i = begin; i < end; ++i) {
+                links_.get(i, links);
+                addArriving(radiance, links, gatherer_.conditionOf(i), sum);
+                row.clear();
+                const Rounding rounding(i, Rounding::Of::Bounced);
+                for (const uint32_t t : sum.touched()) {
+                    const glm::vec3 lux = sum[t] * lux_per_radiance;
+                    if (!isLetGo(t, lux)) row.emplace_back(t, lux, rounding);
+                }
+                sum.clear();
+                emit(std::span<const TermLight>(row));
+            }
+        });
+    }
+
+    bool isLetGo(uint32_t term, glm::vec3 lux) const { return !least_.empty() && luminance(lux) < least_[term]; }
 
     // Light of a row, asked for by ascending terms.
     class TermsInOrder {
@@ -278,20 +310,25 @@ class Expansion {
             if (const uint32_t term = paths_.moved(l.term, path, own); term != no_term) sum[term].add(l, share);
     }
 
-    // Running sum: each round follows the whole light once. Each group ends when what is still to come of its own light
-    // is little.
+    // Running sum: each round follows the whole light once, between blocks of receivers, and the last bounce goes from
+    // receiver to receiver. Each group ends when what is still to come of its own light is little.
     void bounce() {
         progress_.stage("bounces" + what_for_, settings_.bounces_max);
+        const ReceiverBlocks blocks(gatherer_);
+        const Links links = blocks.links(links_);
+        const SparseLight direct = blocks.arriving(out_.direct, terms_);
         Acceleration acceleration = accelerationFor(longRunAlbedo(gatherer_, links_, settings_.series_rays));
-        Convergence convergence(gatherer_, acceleration);
-        SparseLight previous = SparseLight::Builder(receivers_).finish();
-        out_.bounced = SparseLight::Builder(receivers_).finish();
-        out_.bounces.assign(paths_.groupCount(), 0);
-        for (uint32_t n = 0; n < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
+        Convergence convergence(paths_, blocks.areasM2(), acceleration);
+        SparseLight previous = SparseLight::Builder(blocks.size()).finish(), bounced = previous;
+        out_.bounces.assign(paths_.groupCount(), 1);
+        for (uint32_t n = 0; n + 1 < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
+            const SparseLight radiance = outgoing(
+                blocks.size(), direct, bounced, false, [&](size_t i) { return blocks.reflectance(i); },
+                [&](size_t i) { return blocks.condition(i); }, Rounding::Of::BlockOutgoing);
             SparseLight next =
-                follow(outgoing(out_.bounced, false), out_.bounced, previous, acceleration.nextWeight(), convergence);
-            previous = std::exchange(out_.bounced, std::move(next));
-            decideLeast(n);
+                follow(blocks, links, radiance, bounced, previous, acceleration.nextWeight(), convergence);
+            previous = std::exchange(bounced, std::move(next));
+            decideLeast(n, [&] { return atReceivers(blocks, bounced); });
             progress_.advance(1);
             for (uint32_t g = 0; g < paths_.groupCount(); ++g) {
                 if (!running_[g]) continue;
@@ -301,7 +338,16 @@ class Expansion {
                     ++out_.bounces[g];
             }
         }
+        previous = {};
+        out_.bounced = followOnce(leavingReceivers(atReceivers(blocks, bounced)));
         links_ = {};
+    }
+
+    // Blocks' light at each of their receivers.
+    SparseLight atReceivers(const ReceiverBlocks& blocks, const SparseLight& light) const {
+        return SparseLight::build(receivers_, [&](size_t begin, size_t end, auto emit) {
+            for (size_t i = begin; i < end; ++i) emit(light.row(blocks.of(i)));
+        });
     }
 
     // Of rounds too few for the tolerance each is plainly one bounce more, or the first ones would be too bright.
@@ -316,9 +362,10 @@ class Expansion {
 
     // From the second bounce on, a set's light that is far below its activity threshold is let go: without this, every
     // set would linger everywhere at a millionth of a lux. Light through several doors takes several bounces to appear.
-    void decideLeast(uint32_t round) {
+    void decideLeast(uint32_t round, auto&& bounced) {
         const bool first = least_.empty();
         if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(round + 1))) return;
+        out_.bounced = bounced();
         const std::vector<TermReport> reports = activity_.thresholds(out_, lingering_threshold_max);
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)

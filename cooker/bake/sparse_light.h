@@ -28,7 +28,7 @@ namespace dimmer::cook {
 // light of two rounds ago along, so rounded: a hundredth of a percent.)
 class Rounding {
    public:
-    enum class Of : uint32_t { Direct, Bounced, Outgoing, Around };
+    enum class Of : uint32_t { Direct, Bounced, Outgoing, Around, BlockDirect, BlockBounced, BlockOutgoing };
     Rounding(size_t receiver, Of of) {
         for (uint32_t c = 0; c < 3; ++c)
             bits_[c] = hash(static_cast<uint32_t>(receiver), 3 * static_cast<uint32_t>(of) + c);

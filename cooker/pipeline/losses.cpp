@@ -112,7 +112,7 @@ std::vector<float> LossTable::listRecords(const Baked& baked, std::span<const fl
         for (const ReceiverLight& l : baked.light.row(i))
             if (l.term != always_group)
                 row.push_back(
-                    {luminance(l.light.irradiance()), {i, l.term, 0, 0, lostAt(l, thresholds[terms_[l.term].group])}});
+                    {luminance(l.light.irradiance()), {i, l.term, {}, 0, lostAt(l, thresholds[terms_[l.term].group])}});
         // As limitOverlap() has them: of equals the earlier term.
         std::ranges::stable_sort(row, std::greater{}, [](const auto& entry) { return entry.first; });
         for (const auto& [light, record] : row) {
@@ -145,12 +145,10 @@ void LossTable::weigh(const Texels& texels, std::span<const float> lux, std::spa
     forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t k) { energy[groupOf(r)] += energyOf(r, k); });
     for (size_t k = 0; k < records_.size(); ++k) {
         Record& r = records_[k];
-        double error = 0;
         for (const bool open : {false, true})
             if (const StateLight& state = states[open]; isLit(terms_[r.term], open) && state.above(r.receiver) > 0)
-                error += static_cast<double>(lux[k] * texels.area_m2[r.receiver]) /
-                         (state.above(r.receiver) * 2 * std::max(area_m2, 1e-30));
-        r.error = static_cast<float>(error);
+                r.error[open] = static_cast<float>(static_cast<double>(lux[k] * texels.area_m2[r.receiver]) /
+                                                   (state.above(r.receiver) * 2 * std::max(area_m2, 1e-30)));
         if (const double all = energy[groupOf(r)]; all > 0) r.energy = static_cast<float>(energyOf(r, k) / all);
     }
 }
@@ -158,30 +156,43 @@ void LossTable::weigh(const Texels& texels, std::span<const float> lux, std::spa
 LossSteps LossTable::steps(const Rungs& rungs) const {
     LossSteps sum(groupCount(), door_count_);
     forKept(rungs, [&](const Record& r, size_t) {
-        const Loss loss{copies_[r.receiver] * sizeof(TexelRecord), static_cast<double>(r.error),
+        const Loss loss{copies_[r.receiver] * sizeof(TexelRecord), static_cast<double>(r.error[0] + r.error[1]),
                         static_cast<double>(r.energy)};
         if (r.lost_at < threshold_rungs.size()) sum.add(groupOf(r), r.lost_at, loss, terms_[r.term]);
     });
     return sum;
 }
 
+// Of what each receiver loses, less what comes back in its place: with doors closed and open apart, as what is gained
+// in one of them makes up for nothing in the other, nor at another receiver.
+double LossTable::errorOf(const Rungs& rungs) const {
+    std::vector<std::array<float, 2>> lost(copies_.size());
+    forKept(Rungs(groupCount(), 0), [&](const Record& r, size_t) {
+        for (const bool open : {false, true}) lost[r.receiver][open] += r.error[open];
+    });
+    forKept(rungs, [&](const Record& r, size_t) {
+        for (const bool open : {false, true}) lost[r.receiver][open] -= r.error[open];
+    });
+    double error = 0;
+    for (const auto& of_state : lost) error += static_cast<double>(std::abs(of_state[0]) + std::abs(of_state[1]));
+    return error;
+}
+
 Loss LossTable::loss(const Rungs& rungs) const {
     struct Held {
         uint64_t bytes = 0;
-        double error = 0;
         std::vector<double> energy;
     };
     const auto held = [&](const Rungs& at) {
         Held sum{.energy = std::vector<double>(groupCount())};
         forKept(at, [&](const Record& r, size_t) {
             sum.bytes += copies_[r.receiver] * sizeof(TexelRecord);
-            sum.error += static_cast<double>(r.error);
             sum.energy[groupOf(r)] += static_cast<double>(r.energy);
         });
         return sum;
     };
     const Held before = held(Rungs(groupCount(), 0)), after = held(rungs);
-    Loss loss{before.bytes - after.bytes, std::max(0.0, before.error - after.error), 0};
+    Loss loss{before.bytes - after.bytes, errorOf(rungs), 0};
     for (uint32_t g = 0; g < groupCount(); ++g)
         if (const double lost = before.energy[g] - after.energy[g]; lost > loss.energy) {
             loss.energy = lost;

@@ -96,12 +96,14 @@ class LossTable {
    private:
     struct Record {
         uint32_t receiver, term;
-        float error, energy;  // what goes with it, see Loss
-        uint8_t lost_at;      // the first rung at which it goes; threshold_rungs.size(): never
+        std::array<float, 2> error;  // what goes with it, see Loss; with doors closed, and open
+        float energy;
+        uint8_t lost_at;  // the first rung at which it goes; threshold_rungs.size(): never
     };
     struct StateLight;
     // Calls each(record, its number) for what receivers hold at `rungs`.
     void forKept(const Rungs& rungs, auto&& each) const;
+    double errorOf(const Rungs& rungs) const;
     uint32_t groupOf(const Record& record) const { return terms_[record.term].group; }
     // Returns the records' light.
     std::vector<float> listRecords(const Baked& baked, std::span<const float> thresholds);

@@ -17,7 +17,9 @@ static_assert(static_cast<int>(RecordsState::Loaded) == DIMMER_RECORDS_LOADED &&
 bool isLightSet(const LightState& lights, uint32_t element) {
     const auto elements = lights.pack().elements();
     if (element < elements.size() && elements[element].kind == ElementKind::LightSet) return true;
-    report({ErrorCode::InvalidArgument, fmt::format("element {} is no light set", element)});
+    report({ErrorCode::InvalidArgument,
+            fmt::format("element {} is no light set of this pack; dimmer_pack_find_light_set() gives their numbers",
+                        element)});
     return false;
 }
 
@@ -71,7 +73,7 @@ dimmer_result dimmer_lights_continue_loading(dimmer_lights* lights, uint64_t byt
     return guarded([&] {
         auto* runtime = runtimeAs<Runtime>(lights);
         if (!runtime) return DIMMER_UNSUPPORTED;
-        const auto progress = bytes_max == 0 ? runtime->continueLoading() : runtime->continueLoading(bytes_max);
+        const auto progress = runtime->continueLoading(bytes_max);
         if (!progress) return report(progress.error());
         if (done_bytes) *done_bytes = progress->done_bytes;
         if (total_bytes) *total_bytes = progress->total_bytes;

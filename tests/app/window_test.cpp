@@ -1,5 +1,7 @@
 // The sample's window, on SDL's display that nobody sees.
 #include <app/tool_fixture.h>
+#include <pack/sample_pack.h>
+#include <write/pack_writer.h>
 
 #include <gtest/gtest.h>
 #include <stb_image.h>
@@ -70,6 +72,20 @@ TEST_F(SampleWindowGpu, PlaysAScriptUnderTheValidationLayers) {
     const auto shown = runUnseen({pack(), "--script", script, "--frames", "8", "--validate"});
     if (shown.err.find("VK_LAYER_KHRONOS_validation is not installed") != std::string::npos)
         GTEST_SKIP() << "the Vulkan validation layer is not installed";
+    EXPECT_EQ(shown.exit_code, 0) << shown.err;
+}
+
+// Names that Dear ImGui takes for ids, or for none, and a maximum beyond what its sliders take.
+TEST_F(SampleWindowGpu, TakesOddNamesAndMaxima) {
+    PackData data = samplePack();
+    data.elements[0].name = "100% a ## b";
+    data.elements[0].max_weight = 3e38f;
+    data.elements[1].name = "%s%n";
+    data.elements[1].max_weight = 1e-30f;
+    data.viewpoints[0].name = "";
+    data.viewpoints[1].name = "View";
+    ASSERT_TRUE(cook::writeFileAtomically(file("odd.dimmer"), cook::packBytes(data)));
+    const auto shown = runUnseen({file("odd.dimmer"), "--frames", "3"});
     EXPECT_EQ(shown.exit_code, 0) << shown.err;
 }
 

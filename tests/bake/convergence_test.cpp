@@ -1,8 +1,6 @@
 // How fast followed light comes to its end.
-#include <bake/baked_scene.h>
 #include <bake/convergence.h>
-#include <bake/door_pairs.h>
-#include <bake/emitters.h>
+#include <bake/gathered_level.h>
 #include <bake/test_scenes.h>
 
 #include <cmath>
@@ -13,20 +11,6 @@
 
 namespace dimmer::cook::test {
 namespace {
-
-// A scene and what gathers its light.
-struct GatheredLevel {
-    explicit GatheredLevel(const Scene& scene, float texels_per_metre = 4)
-        : b(scene, texels_per_metre),
-          paths(b.scene, doorsInSight(*b.rays)),
-          emitters(*b.rays, meshGroups(b.scene)),
-          gatherer(*b.rays, b.charts, b.texels, emitters, paths) {}
-
-    BakedScene b;
-    DoorPaths paths;
-    EmitterSampler emitters;
-    Gatherer gatherer;
-};
 
 // T_n of Chebyshev.
 std::complex<double> polynomial(uint32_t n, std::complex<double> z) {
@@ -207,7 +191,7 @@ double leftAtTheEnd(double eigenvalue, float albedo, float tail_max) {
     const GatheredLevel level(scene);
     const BakedScene& b = level.b;
     Acceleration pace(glm::vec3(albedo), 128);
-    Convergence convergence(level.gatherer, pace);
+    Convergence convergence(level.gatherer.paths(), b.texels.area_m2, pace);
     const auto row = [](size_t i, double lux) {
         return TermLight(always_group, glm::vec3(static_cast<float>(lux)), Rounding(i, Rounding::Of::Bounced));
     };

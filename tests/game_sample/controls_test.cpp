@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 #include <pack/sample_pack.h>
 
+#include <algorithm>
+#include <limits>
+
 namespace dimmer::sample {
 namespace {
 
@@ -69,6 +72,29 @@ TEST_F(ControlsTest, ADoorOpensInASecondUnlessSomebodyMovesIt) {
     controls_.step(0.25f);
     EXPECT_EQ(openOf("door0"), 0.125f);
     EXPECT_EQ(openOf("door1"), 0);
+}
+
+TEST_F(ControlsTest, AllOnIsEachSetsOwnMostAndAtMostOne) {
+    controls_.setAll(false);
+    for (const char* name : {"set0", "set1", "set2", "set3"}) EXPECT_EQ(lights_.weight(LightSet{set(name)}), Weight(0));
+    controls_.setAll(true);
+    for (const char* name : {"set0", "set1", "set2", "set3"}) {
+        const float most = pack_.elements()[set(name)].max_weight;
+        EXPECT_EQ(lights_.weight(LightSet{set(name)}), Weight(std::min(1.0f, most))) << name;
+    }
+    EXPECT_EQ(openOf("door0"), 0);
+}
+
+TEST_F(ControlsTest, ADoorTakesNoNumberThatIsNone) {
+    controls_.setOpen(door("door0"), 0.5f);
+    controls_.setOpen(door("door0"), std::numeric_limits<float>::quiet_NaN());
+    EXPECT_EQ(openOf("door0"), 0.5f);
+    controls_.setOpen(door("door0"), 7);
+    EXPECT_EQ(openOf("door0"), 1);
+    EXPECT_EQ(controls_.target(door("door0")), 1);
+    controls_.send(door("door0"), 0);
+    controls_.step(0.25f);
+    EXPECT_EQ(controls_.target(door("door0")), 0) << "on its way";
 }
 
 TEST_F(ControlsTest, TheTextBringsAnotherRuntimeToTheSameState) {

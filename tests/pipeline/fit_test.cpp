@@ -114,7 +114,7 @@ double meanError(const std::vector<double>& a, const std::vector<double>& b) {
 
 double errorAtPoints(const std::filesystem::path& level, const std::filesystem::path& fitted,
                      const std::filesystem::path& whole) {
-    const auto points = somePoints(level, 3000);
+    const auto points = somePoints(level, 20000);
     return (meanError(allOn(fitted, false, points), allOn(whole, false, points)) +
             meanError(allOn(fitted, true, points), allOn(whole, true, points))) /
            2;

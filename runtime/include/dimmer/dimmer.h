@@ -382,7 +382,7 @@ dimmer_result dimmer_lights_get_records_state(const dimmer_lights* lights, uint3
 /* Of the memory for records: what a light set's take, and what no set's do. */
 dimmer_result dimmer_lights_get_record_bytes(const dimmer_lights* lights, uint32_t light_set, uint64_t* set_bytes,
                                              uint64_t* free_bytes);
-/* Once a frame: copies a piece of at most so many bytes (and 4 MiB; 0: that) and never waits. Of all that was asked for
+/* Once a frame: copies a piece of about so many bytes, 4 MiB at most, and never waits. Of all that was asked for
  * since nothing was loading, `done_bytes` of `total_bytes` are there; either may be null. Equal: all is loaded. */
 dimmer_result dimmer_lights_continue_loading(dimmer_lights* lights, uint64_t bytes_max, uint64_t* done_bytes,
                                              uint64_t* total_bytes);
