@@ -173,15 +173,24 @@ class Expansion {
 
     bool runs(uint32_t term) const { return running_[paths_.terms()[term].group] != 0; }
 
-    // What leaves each of `count` places: rho / pi * (direct + bounced so far), of the groups that still run or of all.
-    SparseLight outgoing(size_t count, const SparseLight& direct, const SparseLight& bounced, bool all,
-                         auto&& reflectance, auto&& condition, Rounding::Of rounding) const {
-        return SparseLight::build(count, [&](size_t begin, size_t end, auto emit) {
+    // As ReceiverBlocks has them.
+    struct Receivers {
+        const Gatherer& gatherer;
+        size_t size() const { return gatherer.receiverCount(); }
+        glm::vec3 reflectance(size_t i) const { return gatherer.reflectance(i); }
+        uint32_t condition(size_t i) const { return gatherer.conditionOf(i); }
+    };
+
+    // What leaves each place, a receiver or a block of them: rho / pi * (direct + bounced so far), of the groups that
+    // still run or of all.
+    SparseLight outgoing(const auto& places, const SparseLight& direct, const SparseLight& bounced, bool all,
+                         Rounding::Of rounding) const {
+        return SparseLight::build(places.size(), [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
             for (size_t i = begin; i < end; ++i) {
-                const glm::vec3 reflect = reflectance(i) / pi;
-                const uint32_t own = condition(i);
+                const glm::vec3 reflect = places.reflectance(i) / pi;
+                const uint32_t own = places.condition(i);
                 for (const auto* part : {&direct, &bounced})
                     for (const TermLight& l : part->row(i)) {
                         const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
@@ -193,9 +202,7 @@ class Expansion {
         });
     }
     SparseLight leavingReceivers(const SparseLight& bounced) const {
-        return outgoing(
-            receivers_, out_.direct, bounced, true, [&](size_t i) { return gatherer_.reflectance(i); },
-            [&](size_t i) { return gatherer_.conditionOf(i); }, Rounding::Of::Outgoing);
+        return outgoing(Receivers{gatherer_}, out_.direct, bounced, true, Rounding::Of::Outgoing);
     }
 
     struct Sum {
@@ -322,9 +329,7 @@ class Expansion {
         SparseLight previous = SparseLight::Builder(blocks.size()).finish(), bounced = previous;
         out_.bounces.assign(paths_.groupCount(), 1);
         for (uint32_t n = 0; n + 1 < settings_.bounces_max && std::ranges::count(running_, 1) > 0; ++n) {
-            const SparseLight radiance = outgoing(
-                blocks.size(), direct, bounced, false, [&](size_t i) { return blocks.reflectance(i); },
-                [&](size_t i) { return blocks.condition(i); }, Rounding::Of::BlockOutgoing);
+            const SparseLight radiance = outgoing(blocks, direct, bounced, false, Rounding::Of::BlockOutgoing);
             SparseLight next =
                 follow(blocks, links, radiance, bounced, previous, acceleration.nextWeight(), convergence);
             previous = std::exchange(bounced, std::move(next));
@@ -367,6 +372,7 @@ class Expansion {
         if (!first && (terms_ == paths_.groupCount() || !std::has_single_bit(round + 1))) return;
         out_.bounced = bounced();
         const std::vector<TermReport> reports = activity_.thresholds(out_, lingering_threshold_max);
+        out_.bounced = {};
         least_.resize(terms_);
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
             least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
