@@ -3,8 +3,13 @@
 #include <charts/planar.h>
 #include <pack/pack_data.h>
 
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
 #include <algorithm>
-#include <unordered_map>
+#include <array>
+#include <numeric>
+#include <utility>
 
 namespace dimmer::cook {
 namespace {
@@ -35,25 +40,38 @@ bool parted(const Gatherer& gatherer, uint32_t a, uint32_t b) {
     return gatherer.rays().blocked(from, to) || gatherer.rays().blocked(to, from);
 }
 
+// Per receiver, the first one of its block.
+std::vector<uint32_t> firstsOfBlocks(const Gatherer& gatherer) {
+    std::vector<uint32_t> firsts(gatherer.receiverCount());
+    std::iota(firsts.begin(), firsts.end(), 0u);
+    std::vector<std::pair<uint64_t, uint32_t>> joined;  // what may be a block's, side by side
+    for (uint32_t i = 0; i < gatherer.texels().size(); ++i)
+        if (joins(gatherer.unwrap(), gatherer.texels(), i))
+            joined.emplace_back(keyOf(gatherer.unwrap(), gatherer.texels(), i), i);
+    tbb::parallel_sort(joined.begin(), joined.end());
+    tbb::parallel_for(size_t{0}, joined.size(), [&](size_t begin) {
+        const uint64_t key = joined[begin].first;
+        if (begin > 0 && joined[begin - 1].first == key) return;
+        std::array<uint32_t, side * side> found{};
+        size_t blocks = 0;
+        for (size_t k = begin; k < joined.size() && joined[k].first == key; ++k) {
+            const uint32_t i = joined[k].second;
+            const auto end = found.begin() + static_cast<std::ptrdiff_t>(blocks);
+            const auto with = std::find_if(found.begin(), end, [&](uint32_t f) { return !parted(gatherer, f, i); });
+            if (with == end) found[blocks++] = i;
+            firsts[i] = *with;
+        }
+    });
+    return firsts;
+}
+
 }  // namespace
 
 ReceiverBlocks::ReceiverBlocks(const Gatherer& gatherer) : gatherer_(gatherer) {
     const auto count = static_cast<uint32_t>(gatherer.receiverCount());
-    std::unordered_map<uint64_t, std::vector<uint32_t>> first_of_key;  // the first receivers of its blocks
+    const std::vector<uint32_t> firsts = firstsOfBlocks(gatherer);
     uint32_t blocks = 0;
-    for (uint32_t i = 0; i < count; ++i) {
-        uint32_t block = blocks;
-        if (i < gatherer.texels().size() && joins(gatherer.unwrap(), gatherer.texels(), i)) {
-            auto& firsts = first_of_key[keyOf(gatherer.unwrap(), gatherer.texels(), i)];
-            const auto with = std::ranges::find_if(firsts, [&](uint32_t first) { return !parted(gatherer, first, i); });
-            if (with == firsts.end())
-                firsts.push_back(i);
-            else
-                block = of_receiver_[*with];
-        }
-        of_receiver_.push_back(block);
-        blocks = std::max(blocks, block + 1);
-    }
+    for (uint32_t i = 0; i < count; ++i) of_receiver_.push_back(firsts[i] == i ? blocks++ : of_receiver_[firsts[i]]);
     first_.resize(blocks + 1);
     for (const uint32_t block : of_receiver_) ++first_[block + 1];
     for (size_t block = 0; block < blocks; ++block) first_[block + 1] += first_[block];
@@ -80,12 +98,13 @@ Links ReceiverBlocks::links(const Links& of_receivers) const {
         for (size_t block = begin; block < end; ++block) {
             const auto members = receivers(block);
             const auto step = static_cast<uint32_t>(members.size());
-            uint32_t number = hash(static_cast<uint32_t>(block)) % step;
+            const uint32_t chance = hash(static_cast<uint32_t>(block));
             some.clear();
-            for (const uint32_t i : members) {
-                of_receivers.get(i, of_one);
-                for (const Link& link : of_one)
-                    if (number++ % step == 0) some.push_back({of(link.receiver), link.path});
+            // Each begins at another of its links, which are sorted: together they sample all evenly.
+            for (uint32_t m = 0; m < step; ++m) {
+                of_receivers.get(members[m], of_one);
+                for (size_t k = (chance + m) % step; k < of_one.size(); k += step)
+                    some.push_back({of(of_one[k].receiver), of_one[k].path});
             }
             builder.put(block, some);
         }

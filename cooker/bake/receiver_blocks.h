@@ -28,7 +28,8 @@ class ReceiverBlocks {
     glm::vec3 reflectance(size_t block) const { return reflectance_[block]; }  // the mean
     uint32_t condition(size_t block) const { return condition_[block]; }       // as Gatherer::conditionOf()
 
-    // As many of the links of a block's receivers as one of them has on average, every so manieth, from block to block.
+    // As many of the links of a block's receivers as one of them has on average, from block to block: of n receivers
+    // every n-th link.
     Links links(const Links& of_receivers) const;
     // Of light that arrives at receivers, what gives each block's reflectance the same flux to send on.
     SparseLight arriving(const SparseLight& at_receivers, uint32_t terms) const;

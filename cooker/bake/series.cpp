@@ -358,9 +358,10 @@ class Expansion {
     // Of rounds too few for the tolerance each is plainly one bounce more, or the first ones would be too bright.
     Acceleration accelerationFor(glm::vec3 albedo) const {
         const Acceleration acceleration(albedo, settings_.series_rays);
+        const uint32_t rounds_max = settings_.bounces_max - 1;  // the last bounce is a plain one
         // The factor is what T_n may differ by from its larger part.
         for (int c = 0; c < 3; ++c)
-            if (2 * std::pow(acceleration.ratio()[c], static_cast<float>(settings_.bounces_max)) > settings_.tail_max)
+            if (2 * std::pow(acceleration.ratio()[c], static_cast<float>(rounds_max)) > settings_.tail_max)
                 return Acceleration(albedo, 1);
         return acceleration;
     }
