@@ -82,16 +82,19 @@ bool Activity::seesDoorOf(size_t receiver, uint32_t term) const {
                                [&](uint32_t door) { return paths_.terms()[term].isAbout(door); });
 }
 
+void Activity::measure(Series& series) const {
+    series.reports = thresholds(series, 1);
+    series.threshold_base.clear();
+    for (uint32_t t = 0; t < paths_.termCount(); ++t) {
+        const float share = settings_.thresholdOf(paths_.terms()[t].group);
+        series.threshold_base.push_back(share > 0 ? series.reports[t].threshold_lux / share : 0.0f);
+    }
+}
+
 // By bounced light over neighbouring texels: by its own few rays a receiver that saw little would be cut and its
 // neighbour that saw much be kept, which leaves faint light too dark and terms' regions ragged.
 void Activity::decide(Series& series) const {
     const size_t terms = paths_.termCount();
-    series.reports = thresholds(series, 1);
-    series.threshold_base.clear();
-    for (uint32_t t = 0; t < terms; ++t) {
-        const float share = settings_.thresholdOf(paths_.terms()[t].group);
-        series.threshold_base.push_back(share > 0 ? series.reports[t].threshold_lux / share : 0.0f);
-    }
     SparseLight active = activeAround(series);
     const std::vector<double> energy = flux(series);
     const std::vector<double> dropped =

@@ -15,7 +15,9 @@ class Activity {
     // Per term; of TermReport, all that needs no knowledge of where the term is active. `most`: no threshold is taken
     // to be a larger share.
     std::vector<TermReport> thresholds(const Series& light, float most) const;
-    // Fills in the reports, and leaves of `bounced` what is active.
+    // Fills in thresholds and what they are shares of.
+    void measure(Series& series) const;
+    // Of a series measured: fills in what the reports lack, and leaves of `bounced` what is active.
     void decide(Series& series) const;
     // Per term, what is stored of it if nothing is dropped, lm.
     std::vector<double> flux(const Series& light) const;

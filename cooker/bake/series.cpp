@@ -67,7 +67,9 @@ class Expansion {
         directPass(UINT32_MAX);
         out_.doors_near = doorsNear(links_, doors_seen_);
         bounce();
-        out_.radiance = leavingReceivers(out_.bounced);
+        activity_.measure(out_);
+        // Two thirds of what rays would read in a level of many sets lies below its threshold.
+        out_.radiance = leavingReceivers(out_.bounced, faint());
         activity_.decide(out_);
         out_.rays = rays_traced_;
         out_.doors_seen = std::move(doors_seen_);
@@ -85,7 +87,8 @@ class Expansion {
     template <class Value>
     static void takeRow(TermAccumulator<Value>& sum, const Rounding& rounding, std::vector<TermLight>& row) {
         row.clear();
-        for (uint32_t t : sum.touched()) row.emplace_back(t, irradianceOf(sum[t]), rounding);
+        for (uint32_t t : sum.touched())
+            if (const glm::vec3 lux = irradianceOf(sum[t]); lux != glm::vec3(0)) row.emplace_back(t, lux, rounding);
         sum.clear();
     }
     static glm::vec3 irradianceOf(const Gathered& light) { return light.irradiance_lux; }
@@ -182,9 +185,9 @@ class Expansion {
     };
 
     // What leaves each place, a receiver or a block of them: rho / pi * (direct + bounced so far), of the groups that
-    // still run or of all.
+    // still run or of all. `faint_lux`: as faint() has it, or empty: all stays as it is.
     SparseLight outgoing(const auto& places, const SparseLight& direct, const SparseLight& bounced, bool all,
-                         Rounding::Of rounding) const {
+                         Rounding::Of rounding, std::span<const float> faint_lux = {}) const {
         return SparseLight::build(places.size(), [&](size_t begin, size_t end, auto emit) {
             TermAccumulator<glm::vec3> sum(terms_);
             std::vector<TermLight> row;
@@ -196,13 +199,14 @@ class Expansion {
                         const uint32_t term = all || runs(l.term) ? paths_.leaving(l.term, own) : no_term;
                         if (term != no_term) sum[term] += reflect * l.value();
                     }
+                if (!faint_lux.empty()) thin(i, sum, faint_lux);
                 takeRow(sum, Rounding(i, rounding), row);
                 emit(std::span<const TermLight>(row));
             }
         });
     }
-    SparseLight leavingReceivers(const SparseLight& bounced) const {
-        return outgoing(Receivers{gatherer_}, out_.direct, bounced, true, Rounding::Of::Outgoing);
+    SparseLight leavingReceivers(const SparseLight& bounced, std::span<const float> faint_lux = {}) const {
+        return outgoing(Receivers{gatherer_}, out_.direct, bounced, true, Rounding::Of::Outgoing, faint_lux);
     }
 
     struct Sum {
@@ -279,6 +283,27 @@ class Expansion {
                 emit(std::span<const TermLight>(row));
             }
         });
+    }
+
+    // Per term, lm/m2: where less leaves a receiver, some receivers stand for all.
+    std::vector<float> faint() const {
+        std::vector<float> lux;
+        for (uint32_t t = 0; t < terms_; ++t) {
+            const float threshold = settings_.thresholdOf(paths_.terms()[t].group);
+            lux.push_back(std::min(threshold, lingering_threshold_max) * out_.threshold_base[t]);
+        }
+        return lux;
+    }
+    // Leaves of what is faint that much at some receivers and nothing at the others, as often as makes it right in the
+    // mean. Neighbours take turns, by the golden ratio; all terms by the same, so that more light is never less.
+    static void thin(size_t receiver, TermAccumulator<glm::vec3>& radiance, std::span<const float> faint_lux) {
+        constexpr uint32_t golden = 0x9e3779b9;
+        const float chance = unitFloat(static_cast<uint32_t>(receiver) * golden);
+        for (const uint32_t t : radiance.touched()) {
+            const float lux = pi * luminance(radiance[t]);
+            if (lux >= faint_lux[t]) continue;
+            radiance[t] *= lux > chance * faint_lux[t] ? faint_lux[t] / lux : 0.0f;
+        }
     }
 
     bool isLetGo(uint32_t term, glm::vec3 lux) const { return !least_.empty() && luminance(lux) < least_[term]; }
