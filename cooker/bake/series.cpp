@@ -298,7 +298,8 @@ class Expansion {
     // mean. Neighbours take turns, by the golden ratio; all terms by the same, so that more light is never less.
     static void thin(size_t receiver, TermAccumulator<glm::vec3>& radiance, std::span<const float> faint_lux) {
         constexpr uint32_t golden = 0x9e3779b9;
-        const float chance = unitFloat(static_cast<uint32_t>(receiver) * golden);
+        constexpr float half_step = 0x1p-25f;  // of unitFloat(): never 0, or the least light would be made infinite
+        const float chance = unitFloat(static_cast<uint32_t>(receiver) * golden) + half_step;
         for (const uint32_t t : radiance.touched()) {
             const float lux = pi * luminance(radiance[t]);
             if (lux >= faint_lux[t]) continue;

@@ -18,7 +18,7 @@ struct Series {
     SparseLight bounced;                  // after one bounce or more, lux: over the texels around, where active
     SparseLight left_to_renderer;         // the part of `direct` that renderers draw themselves and no pack stores
     Sparse<ReceiverLight> stored_direct;  // the punctual part of `direct` that packs store
-    SparseLight radiance;                 // what leaves each receiver, cd/m2
+    SparseLight radiance;                 // what leaves each receiver, cd/m2; of what is faint, some for all
     Sparse<uint32_t> doors_seen;          // by the rays of each receiver, ascending
     std::vector<DoorIndices> doors_near;  // pairs of one another; see doorsNear() (bake/door_pairs.h)
     std::vector<TermReport> reports;      // per term
