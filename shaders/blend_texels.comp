@@ -14,6 +14,7 @@ layout(local_size_x_id = 1) in;
 layout(constant_id = 0) const int terms_on = -1;
 
 layout(constant_id = 2) const uint color_format = 0u;  // ColorFormat
+layout(constant_id = 3) const uint column_bits = 9u;   // of a tile's number
 
 layout(push_constant) uniform Dispatch {
     uint first_item;
@@ -22,7 +23,8 @@ layout(push_constant) uniform Dispatch {
 dispatch;
 
 // Texel buffers, as lavapipe loads 16 bytes from one several times faster than from a storage buffer.
-layout(set = 0, binding = 0) uniform utextureBuffer places;     // two receivers an element, a byte each: BatchTiles::add
+layout(set = 0, binding = 0) uniform utextureBuffer places;     // two receivers an element, a byte each: BatchTiles::add;
+                                                                // batches that lie alike share theirs
 layout(set = 0, binding = 1) uniform utextureBuffer base;       // two records an element
 layout(set = 0, binding = 2) uniform utextureBuffer payload;    // two records an element
 layout(set = 0, binding = 3) uniform utextureBuffer work;       // TexelItem
@@ -42,18 +44,20 @@ const ivec3 nowhere = ivec3(-1);
 // Eight lanes share these.
 struct Item {
     uint first_term, term_count;
-    uvec4 batch;  // TexelBatch
+    uint first_receiver, first_places;  // the latter in pairs
+    uint page, receiver_count;
+    uvec4 tiles;
 };
 
 Item load_item(uint index) {
     uvec2 work_item = texelFetch(work, int(index)).xy;
-    const uint low_26 = 0x3ffffffu;
-    return Item(work_item.y & low_26, work_item.x >> 26 | work_item.y >> 26 << 6,
-                texelFetch(batches, int(work_item.x & low_26)));
-}
-
-uint receiver_count(Item item) {
-    return (item.batch.y >> 18 & 63u) + 1u;
+    const uint low_26 = 0x3ffffffu, low_27 = 0x7ffffffu, low_18 = 0x3ffffu;
+    uvec4 batch = texelFetch(batches, int(work_item.x & low_26));
+    uint tile_1 = batch.w & low_18, tile_2 = tile_1 + (batch.w >> 18 & 0xfffu);
+    uint tile_3 = tile_2 + (batch.x >> 27 | batch.y >> 27 << 5 | batch.w >> 30 << 10);
+    return Item(work_item.y & low_26, work_item.x >> 26 | work_item.y >> 26 << 6, (batch.x & low_27) << 1,
+                batch.y & low_27, batch.z >> 24, (batch.z >> 18 & 63u) + 1u,
+                uvec4(batch.z & low_18, tile_1, tile_2, tile_3));
 }
 
 // The pair of records `offset` receivers into the item.
@@ -64,7 +68,7 @@ uvec4 load_pair(uint first_record, uint offset) {
 // The item's first record of a term, and its weight.
 uvec4 locate(Item item, uint index) {
     uvec4 term = texelFetch(terms, int(item.first_term + index));
-    return uvec4(term.x + item.batch.x, term.yzw);
+    return uvec4(term.x + item.first_receiver, term.yzw);
 }
 
 // Past an item's last term its record stands in, weighted with 0: that changes no bit of a sum.
@@ -77,7 +81,7 @@ uvec4 load_term(Item item, uint t) {
 
 // Both texels of a pair with `terms_on` terms; all is loaded before it is used, one texel's sums live at a time.
 uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
-    uvec4 base_pair = texelFetch(base, int((item.batch.x + offset) >> 1));
+    uvec4 base_pair = texelFetch(base, int((item.first_receiver + offset) >> 1));
     if (terms_on == 0) return base_pair;
     uvec4 pair[specialised_max];
     for (int t = 0; t < terms_on; ++t) pair[t] = load_pair(term[t].x, offset);
@@ -95,7 +99,7 @@ uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
 
 // The same for any number of terms, in blocks within which the sums stay in registers; padded like load_term.
 uvec4 blend_pair_loop(Item item, uint offset) {
-    uvec4 base_pair = texelFetch(base, int((item.batch.x + offset) >> 1));
+    uvec4 base_pair = texelFetch(base, int((item.first_receiver + offset) >> 1));
     DimmerTexelBlend first = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
     DimmerTexelBlend second = first;
     dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale(color_format)), color_format);
@@ -116,10 +120,10 @@ uvec4 blend_pair_loop(Item item, uint offset) {
 
 // A receiver's texel, by its byte.
 ivec3 texel_of(Item item, uint place) {
-    uint tile_3 = item.batch.z >> 18 | item.batch.w >> 18 << 14;
-    uint even = (place & 128u) == 0u ? item.batch.y : item.batch.w, odd = (place & 128u) == 0u ? item.batch.z : tile_3;
-    uint tile = (place & 64u) == 0u ? even : odd;
-    return ivec3((tile & 511u) << 3 | (place & 7u), (tile >> 9 & 511u) << 3 | (place >> 3 & 7u), item.batch.y >> 24);
+    uvec2 pair = (place & 128u) == 0u ? item.tiles.xy : item.tiles.zw;
+    uint tile = (place & 64u) == 0u ? pair.x : pair.y;
+    uint column = tile & ((1u << column_bits) - 1u), row = tile >> column_bits;
+    return ivec3(column << 3 | (place & 7u), row << 3 | (place >> 3 & 7u), item.page);
 }
 
 void store(ivec3 texel, uvec2 record) {
@@ -128,9 +132,9 @@ void store(ivec3 texel, uvec2 record) {
 }
 
 void store_pair(Item item, uint offset, uvec4 records) {
-    uvec2 place = texelFetch(places, int((item.batch.x + offset) >> 1)).xy;
+    uvec2 place = texelFetch(places, int(item.first_places + (offset >> 1))).xy;
     store(texel_of(item, place.x), records.xy);
-    store(offset + 1u < receiver_count(item) ? texel_of(item, place.y) : nowhere, records.zw);
+    store(offset + 1u < item.receiver_count ? texel_of(item, place.y) : nowhere, records.zw);
 }
 
 void main() {
@@ -143,7 +147,7 @@ void main() {
     uvec4 term[specialised_max];
     for (int t = 0; t < terms_on; ++t) term[t] = load_term(item, uint(t));
     uint lane = gl_LocalInvocationIndex % lanes_per_item;
-    for (uint offset = lane * receivers_per_lane; offset < receiver_count(item);
+    for (uint offset = lane * receivers_per_lane; offset < item.receiver_count;
          offset += lanes_per_item * receivers_per_lane) {
         store_pair(item, offset, terms_on < 0 ? blend_pair_loop(item, offset) : blend_pair(item, offset, term));
     }

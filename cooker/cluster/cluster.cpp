@@ -139,7 +139,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
         {pack.clusters, pack.terms, pack.batches, pack.addresses, pack.payload},
         [&](uint32_t t) { return shown[t].address; }, [&](uint32_t t) { return baked.light.row(shown[t].source); },
         [&](const Gathered& light) { return encodeTexel(light, encoding); },
-        [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, first, pack.batches); });
+        [&](uint32_t first, uint32_t) { cutIntoBatches(pack.addresses, pack.page_width, first, pack.batches); });
     for (size_t k = 0; k < counts.size(); ++k) pack.contributions[k].receivers = counts[k];
 }
 

@@ -93,7 +93,7 @@ void addCluster(const std::vector<uint32_t>& contributions, std::span<const uint
         pack.contributions[k].receivers += count;
     }
     pack.addresses.insert(pack.addresses.end(), addresses.begin(), addresses.end());
-    cutIntoBatches(pack.addresses, cluster.first_receiver, pack.batches);
+    cutIntoBatches(pack.addresses, pack.page_width, cluster.first_receiver, pack.batches);
     cluster.batch_count = static_cast<uint32_t>(pack.batches.size()) - cluster.first_batch;
     pack.clusters.push_back(cluster);
 }

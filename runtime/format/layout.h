@@ -8,7 +8,7 @@
 namespace dimmer::format {
 
 inline constexpr std::array<char, 8> magic = {'D', 'I', 'M', 'M', 'E', 'R', '\r', '\n'};
-inline constexpr uint32_t version = 8;
+inline constexpr uint32_t version = 9;
 inline constexpr uint32_t endian_tag = 0x01020304;
 inline constexpr uint64_t chunk_alignment_bytes = 64;
 

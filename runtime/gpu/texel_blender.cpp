@@ -6,6 +6,7 @@
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
+#include <pack/batches.h>
 #include <spirv/blend_texels_comp.h>
 #include <update/device_places.h>
 
@@ -27,13 +28,13 @@ std::vector<Run> receiverRuns(const PackData& data, const DevicePlaces& places) 
     std::vector<Run> runs;
     for (const Cluster& cluster : data.clusters)
         runs.push_back(
-            {places.batches[cluster.first_batch].first_receiver, cluster.first_receiver, cluster.receiver_count});
+            {firstReceiver(places.batches[cluster.first_batch]), cluster.first_receiver, cluster.receiver_count});
     return runs;
 }
 
-Specialisation specialisationOf(uint32_t group, ColorFormat format) {
+Specialisation specialisationOf(uint32_t group, const PackData& data) {
     return {group < unrolled_terms.size() ? unrolled_terms[group] : UINT32_MAX, workgroup_size,
-            static_cast<uint32_t>(format)};
+            static_cast<uint32_t>(data.color_format), tileColumnBits(data.page_width)};
 }
 
 }  // namespace
@@ -43,17 +44,20 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t a
     // Of the records, the store has no more than this on the device at a time.
     const uint64_t all_bytes = places.records * sizeof(TexelRecord);
     const uint64_t payload_bytes = records_bytes_max == 0 ? all_bytes : std::min(all_bytes, records_bytes_max);
-    const uint64_t base_bytes = places.receivers.size() * sizeof(TexelRecord);
+    const uint64_t base_bytes = places.receivers * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
     // Each buffer has an allocation of its own.
     const uint64_t bytes_max = std::min(limits.maxTexelBufferElements * wide_bytes, allocation_bytes_max);
     constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
-    if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end)
+    if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end ||
+        places.receivers >= device_receivers_max)
         return fail(
             ErrorCode::Unsupported,
-            fmt::format("The pack has {} batches and {} terms, up to {} at a receiver; this runtime takes fewer "
-                        "than {}, {} and {}. Cook with fewer texels per metre or a higher activity threshold.",
-                        planner.itemsMax(), planner.termsMax(), planner.overlapMax(), index_end, index_end, count_end));
+            fmt::format("The pack has {} batches, {} terms, up to {} at a receiver, and {} receivers; this runtime "
+                        "takes fewer than {}, {}, {} and {}. Cook with fewer texels per metre or a higher activity "
+                        "threshold.",
+                        planner.itemsMax(), planner.termsMax(), planner.overlapMax(), places.receivers, index_end,
+                        index_end, count_end, device_receivers_max));
     if (std::max({payload_bytes, base_bytes, work_bytes}) <= bytes_max) return {};
     return fail(
         ErrorCode::Unsupported,
@@ -84,18 +88,18 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
     DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
     for (uint32_t i = 0; i < options.frames_in_flight; ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
-    DIMMER_TRY(blender.createKernel(vulkan, data.color_format, planner, page_sets));
+    DIMMER_TRY(blender.createKernel(vulkan, data, planner, page_sets));
     return blender;
 }
 
 Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
     DevicePlaces places = placesOf(data);
     const auto receivers = receiverRuns(data, places);
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers.size() * sizeof(TexelRecord), wide_format,
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),
                     base_));
-    places.receivers.resize((places.receivers.size() + 3) / 4 * 4);  // uploads are in words
-    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers, places_format), places_));
+    places.bytes.resize((places.bytes.size() + 3) / 4 * 4);  // uploads are in words
+    DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.bytes, places_format), places_));
     return keep(uploadTable(vulkan, transfer, places.batches, wide_format), batches_);
 }
 
@@ -137,12 +141,12 @@ Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Plann
     return {};
 }
 
-Expected<void> TexelBlender::createKernel(const VulkanContext& vulkan, ColorFormat format, const Planner& planner,
+Expected<void> TexelBlender::createKernel(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                           std::span<const LightmapPages> page_sets) {
     std::vector<Specialisation> pipelines;
     // Groups that no cluster can fall into get no pipeline.
     for (uint32_t group = 0; group <= workGroupOf(planner.overlapMax()); ++group)
-        pipelines.push_back(specialisationOf(group, format));
+        pipelines.push_back(specialisationOf(group, data));
     std::vector<KernelBinding> bindings;
     for (const LightmapPages& pages : page_sets)
         for (const Work& work : work_)

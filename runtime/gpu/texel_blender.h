@@ -37,7 +37,7 @@ class TexelBlender : public TexelExecutor {
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
     Expected<void> uploadRecords(const PackData& data, Transfer& transfer, bool all);
     Expected<void> createWork(const VulkanContext& vulkan, const Planner& planner);
-    Expected<void> createKernel(const VulkanContext& vulkan, ColorFormat format, const Planner& planner,
+    Expected<void> createKernel(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                 std::span<const LightmapPages> page_sets);
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;

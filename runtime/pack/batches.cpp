@@ -3,13 +3,20 @@
 #include <algorithm>
 
 namespace dimmer {
+namespace {
+
+bool isSoonAfter(uint32_t before, uint32_t tile) {
+    return tile >= before && tile - before < tile_step_end;
+}
+
+}  // namespace
 
 std::optional<uint8_t> BatchTiles::add(uint32_t address) {
     if (tile_count > 0 && TexelAddress::page(address) != page) return std::nullopt;
-    const uint32_t tile = tileOf(address);
+    const uint32_t tile = TexelAddress::y(address) / tile_side << column_bits | TexelAddress::x(address) / tile_side;
     uint32_t slot = 0;
     while (slot < tile_count && tiles[slot] != tile) ++slot;
-    if (slot == batch_tiles_max) return std::nullopt;
+    if (slot == batch_tiles_max || (slot > 1 && !isSoonAfter(tiles[slot - 1], tile))) return std::nullopt;
     if (slot == tile_count) {
         page = TexelAddress::page(address);
         tiles[tile_count++] = tile;
@@ -18,11 +25,11 @@ std::optional<uint8_t> BatchTiles::add(uint32_t address) {
                                 TexelAddress::x(address) % tile_side);
 }
 
-void cutIntoBatches(std::span<const uint32_t> addresses, uint32_t first_receiver, std::vector<Batch>& batches,
-                    uint32_t receivers_max) {
+void cutIntoBatches(std::span<const uint32_t> addresses, uint32_t page_width, uint32_t first_receiver,
+                    std::vector<Batch>& batches, uint32_t receivers_max) {
     const auto end = static_cast<uint32_t>(addresses.size());
     while (first_receiver < end) {
-        BatchTiles tiles;
+        BatchTiles tiles(page_width);
         uint32_t count = 0;
         while (count < receivers_max && first_receiver + count < end && tiles.add(addresses[first_receiver + count]))
             ++count;

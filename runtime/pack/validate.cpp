@@ -137,10 +137,11 @@ Expected<void> validateBatchTiles(const PackData& d) {
     for (const Cluster& c : d.clusters)
         for (uint32_t b = c.first_batch; b < c.first_batch + c.batch_count; ++b) {
             const Batch& batch = d.batches[b];
-            BatchTiles tiles;
+            BatchTiles tiles(d.page_width);
             for (uint32_t i = 0; i < batch.receiver_count; ++i)
                 if (!tiles.add(d.addresses[batch.first_receiver + i]))
-                    return unusable("batch {} lies in more than {} tiles of one page", b, batch_tiles_max);
+                    return unusable("batch {} lies in more than {} tiles of one page, or in a third or fourth far off",
+                                    b, batch_tiles_max);
             if (batch.receiver_count % 2 != 0 && b + 1 < c.first_batch + c.batch_count)
                 return unusable("batch {} has an odd number of receivers and is not its cluster's last", b);
         }

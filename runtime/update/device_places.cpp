@@ -5,31 +5,60 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <map>
+#include <string_view>
 
 namespace dimmer {
 namespace {
 
-// A valid pack's batches fit their tiles.
-void addBatch(const PackData& data, const Batch& batch, DevicePlaces& places) {
-    const auto first = static_cast<uint32_t>(places.receivers.size());
-    BatchTiles tiles;
-    for (uint32_t i = 0; i < batch.receiver_count; ++i)
-        places.receivers.push_back(tiles.add(data.addresses[batch.first_receiver + i]).value_or(0));
+// The places of batches, each way to lie in tiles once.
+class SharedPlaces {
+   public:
+    SharedPlaces(std::vector<uint8_t>& bytes, size_t bytes_max) : bytes_(bytes) { bytes_.reserve(bytes_max); }
+
+    // Fills `tiles` from an empty one, and returns where the batch's places begin. A valid pack's batches fit their
+    // tiles.
+    size_t add(std::span<const uint32_t> addresses, BatchTiles& tiles) {
+        const size_t first = bytes_.size();
+        for (const uint32_t address : addresses) bytes_.push_back(tiles.add(address).value_or(0));
+        if (bytes_.size() % 2 != 0) bytes_.push_back(0);
+        const std::string_view added(reinterpret_cast<const char*>(bytes_.data() + first), bytes_.size() - first);
+        const auto [known, is_new] = first_.emplace(added, first);
+        if (!is_new) bytes_.resize(first);
+        return known->second;
+    }
+
+   private:
+    std::vector<uint8_t>& bytes_;               // never reallocated: views point into it
+    std::map<std::string_view, size_t> first_;  // by a batch's places; no file makes a map slow
+};
+
+TexelBatch texelBatch(uint64_t first_receiver, size_t first_place, uint32_t receivers, const BatchTiles& tiles) {
     const auto& [t0, t1, t2, t3] = tiles.tiles;
-    places.batches.push_back(
-        {first, tiles.page << 24 | (batch.receiver_count - 1) << 18 | t0, t3 << 18 | t1, (t3 >> 14) << 18 | t2});
+    const uint32_t step_2 = tiles.tile_count > 2 ? t2 - t1 : 0, step_3 = tiles.tile_count > 3 ? t3 - t2 : 0;
+    return {(step_3 & 31) << 27 | static_cast<uint32_t>(first_receiver / 2),
+            (step_3 >> 5 & 31) << 27 | static_cast<uint32_t>(first_place / 2),
+            tiles.page << 24 | (receivers - 1) << 18 | t0, (step_3 >> 10) << 30 | step_2 << 18 | t1};
 }
 
 }  // namespace
 
 DevicePlaces placesOf(const PackData& data) {
     DevicePlaces places;
+    places.batches.reserve(data.batches.size());
+    SharedPlaces shared(places.bytes, data.addresses.size() + data.batches.size());
     for (const Cluster& cluster : data.clusters) {
-        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b)
-            addBatch(data, data.batches[b], places);
-        places.receivers.resize(paddedReceivers(static_cast<uint32_t>(places.receivers.size())));
+        for (uint32_t b = cluster.first_batch; b < cluster.first_batch + cluster.batch_count; ++b) {
+            const auto& [first, count] = data.batches[b];
+            BatchTiles tiles(data.page_width);
+            const size_t place = shared.add(std::span(data.addresses).subspan(first, count), tiles);
+            const uint64_t receiver = places.receivers + (first - cluster.first_receiver);
+            places.batches.push_back(texelBatch(receiver, place, count, tiles));
+        }
+        places.receivers += paddedReceivers(cluster.receiver_count);
         places.records += uint64_t{paddedReceivers(cluster.receiver_count)} * cluster.term_count;
     }
+    places.bytes.shrink_to_fit();
     return places;
 }
 
@@ -59,15 +88,11 @@ DeviceBytes deviceBytesOf(const PackData& data) {
     if (!data.probes.payload.empty()) addProbes(data.probes, bytes);
     if (data.payload.empty()) return bytes;  // no texel ever changes
     const uint64_t dynamic = (data.payload.size() + data.addresses.size()) * sizeof(TexelRecord);
-    uint64_t receivers = 0, records = 0;
-    for (const Cluster& cluster : data.clusters) {
-        receivers += paddedReceivers(cluster.receiver_count);
-        records += uint64_t{paddedReceivers(cluster.receiver_count)} * cluster.term_count;
-    }
+    const DevicePlaces places = placesOf(data);
     bytes.dynamic += dynamic;
     // Less the records and the base, which are in the tables and counted already.
-    bytes.ancillary += tableBytes({(receivers + 3) / 4 * 4, receivers * sizeof(TexelRecord),
-                                   records * sizeof(TexelRecord), data.batches.size() * sizeof(TexelBatch),
+    bytes.ancillary += tableBytes({(places.bytes.size() + 3) / 4 * 4, places.receivers * sizeof(TexelRecord),
+                                   places.records * sizeof(TexelRecord), data.batches.size() * sizeof(TexelBatch),
                                    data.batches.size() * sizeof(TexelItem), data.terms.size() * sizeof(WorkTerm)}) -
                        dynamic;
     return bytes;

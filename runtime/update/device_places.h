@@ -16,11 +16,21 @@ constexpr uint32_t paddedReceivers(uint32_t receivers) {
 
 struct DevicePlaces {
     std::vector<TexelBatch> batches;
-    std::vector<uint8_t> receivers;  // BatchTiles::add of each, gaps included
-    uint64_t records = 0;            // likewise
+    // BatchTiles::add of each batch's receivers, an even number; batches that lie alike in their tiles share theirs, as
+    // most whole tiles do.
+    std::vector<uint8_t> bytes;
+    uint64_t receivers = 0, records = 0;  // gaps included
 };
 
+// Receivers that a TexelBatch can name.
+inline constexpr uint64_t device_receivers_max = uint64_t{2} << 27;
+
+// Of a pack with more than device_receivers_max, batches are of no use.
 DevicePlaces placesOf(const PackData& data);
+
+inline uint32_t firstReceiver(const TexelBatch& batch) {
+    return (batch.first_receivers & (device_receivers_max / 2 - 1)) * 2;
+}
 
 // Device memory in bytes of the default mode, pages in place; what drivers add to align it is not counted.
 struct DeviceBytes {

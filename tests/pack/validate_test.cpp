@@ -156,7 +156,7 @@ const Fault address_faults[] = {
      [](PackData& d) {
          std::ranges::sort(d.addresses, {}, [](uint32_t a) { return std::pair(TexelAddress::x(a) % 8, a); });
      },
-     "in more than 4 tiles of one page"},
+     "in more than 4 tiles of one page, or"},
     {"a batch on two pages",
      [](PackData& d) { d.addresses[d.clusters[clusterWith(d, 65, 1, 2)].first_receiver + 1] ^= 1u << 24; },
      "in more than 4 tiles of one page"},

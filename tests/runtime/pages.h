@@ -68,7 +68,7 @@ inline PackData withClustersReversed(const PackData& data) {
         cluster.first_term = static_cast<uint32_t>(out.terms.size());
         for (uint32_t i = 0; i < c->receiver_count; ++i)
             out.addresses.push_back(data.addresses[c->first_receiver + c->receiver_count - 1 - i]);
-        cutIntoBatches(out.addresses, cluster.first_receiver, out.batches);
+        cutIntoBatches(out.addresses, out.page_width, cluster.first_receiver, out.batches);
         cluster.batch_count = static_cast<uint32_t>(out.batches.size()) - cluster.first_batch;
         for (uint32_t t = c->first_term; t < c->first_term + c->term_count; ++t) {
             const ClusterTerm& term = data.terms[t];

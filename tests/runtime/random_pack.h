@@ -106,7 +106,7 @@ inline void fillPack(PackData& data, std::span<const ClusterPlan> plans, Random&
         cluster.term_count = static_cast<uint32_t>(plan.contributions.size());
         const auto first = addresses.begin() + cluster.first_receiver;
         data.addresses.insert(data.addresses.end(), first, first + plan.receivers);
-        cutIntoBatches(data.addresses, cluster.first_receiver, data.batches, batch_size);
+        cutIntoBatches(data.addresses, data.page_width, cluster.first_receiver, data.batches, batch_size);
         cluster.batch_count = static_cast<uint32_t>(data.batches.size()) - cluster.first_batch;
         for (uint32_t k : plan.contributions) {
             data.terms.push_back({k, data.contributions[k].receivers});  // within the contribution, for now

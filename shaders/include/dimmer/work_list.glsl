@@ -31,12 +31,13 @@ struct TexelItem {
     DIMMER_UINT first_term;  // high 6 bits of term_count << 26 | first_term
 };
 
-// A batch of texels on the device: at most four 8x8 tiles of a page; a tile is row << 9 | column.
+// A batch of texels on the device: at most four 8x8 tiles of a page; a tile is row << tileColumnBits() | column. Steps
+// are from tile 1 to 2, and 2 to 3. Receivers and their places (BatchTiles::add) are counted in pairs.
 struct TexelBatch {
-    DIMMER_UINT first_receiver;
+    DIMMER_UINT first_receivers;  // low 5 bits of step 3 << 27 | first pair of receivers
+    DIMMER_UINT first_places;     // next 5 bits of step 3 << 27 | first pair of places
     DIMMER_UINT page_count_tile;  // page << 24 | (receivers - 1) << 18 | tile 0
-    DIMMER_UINT tile_1;           // low 14 bits of tile 3 << 18 | tile 1
-    DIMMER_UINT tile_2;           // high 4 bits of tile 3 << 18 | tile 2
+    DIMMER_UINT step_tile;        // high 2 bits of step 3 << 30 | step 2 << 18 | tile 1
 };
 
 // Where the device keeps a batch of probes.
