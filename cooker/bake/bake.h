@@ -18,6 +18,7 @@ struct GridSettings {
     uint32_t probes_max = 0;     // 0: no grid
     float min_spacing_m = 0.3f;  // of probes that see each other; twice that outside of play areas, where there are any
     uint32_t sites = 16;         // per probe, where light is traced: for placing probes, and for fitting their light
+    uint32_t site_rays = 256;    // from each, all around, at least: they leave some 5 % of noise in irradiance
     float tolerance = 0.07f;     // no probe where interpolation misses the light by less than this share of it
     bool uniform = false;        // a lattice of about probes_max probes instead: to measure placement against
     bool fit = true;  // false: probes keep the light that was traced at them, for measuring what the fit is worth

@@ -32,6 +32,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .grid = {.probes_max = wantsGrid(profile, scene) ? profile.probes_max : 0,
                                    .min_spacing_m = profile.global_min_spacing_m,
                                    .sites = quality.probe_sites,
+                                   .site_rays = quality.probe_rays,
                                    .uniform = quality.grid_baseline == "uniform",
                                    .fit = quality.grid_baseline != "unfitted",
                                    .visibility = quality.grid_baseline != "unseen"}};

@@ -31,6 +31,7 @@ struct Quality {
     uint32_t sharpen = 1;            // 1: texels as bilinear filtering needs them; 0: their means
     uint32_t lamps_apart = 0;        // groups of at most so many lamps are baked lamp by lamp; see lamps_apart.h
     uint32_t probe_sites = 16;       // per probe of the global grid, see GridSettings
+    uint32_t probe_rays = 256;       // likewise
     uint32_t bounces = 64;           // at most
     float tolerance = 0.002f;        // bounces stop when less of places' light is still to come, in the mean
     uint32_t zstd_level = 7;         // of the pack's chunks

@@ -160,6 +160,8 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
          "of its brightness nothing; 0: set by set, in a shorter first cook"});
     list.push_back({prefix + "probe_sites", &q.probe_sites, 1, 256,
                     "places per probe of the global grid at which light is traced, to choose and fit probes by"});
+    list.push_back({prefix + "probe_rays", &q.probe_rays, 32, 4096,
+                    "rays from each of these places, up to four times as many where a small level has few of them"});
     list.push_back({prefix + "bounces", &q.bounces, 1, 1024, "bounces at most; a warning says when they were too few"});
     list.push_back({prefix + "tolerance", &q.tolerance, 1e-6, 1,
                     "bounces end when what is still to come is below this share (0..1) of a set's light, in the mean "

@@ -32,9 +32,9 @@ constexpr float lamp_reach_min_m = 0.8f;
 // them: places farther off than this many times the mean spacing of probes become rarer.
 constexpr double near_spacings = 0.8;
 constexpr uint32_t rarity_seed = 0x2c1b3c6du;
-// Rays are uniform over the sphere: 256 leave some 5 % of noise in irradiance, and a probe's light is fitted to several
-// sites. Small levels get more, as noise misleads where to put the few probes they have.
-constexpr uint32_t site_rays_min = 256, site_rays_max = 1024, small_level_rays = 4'000'000;
+// Small levels get up to four times the rays from each place, while all of them are no more than so many places' usual
+// ones: noise misleads where to put the few probes they have.
+constexpr uint32_t small_level_places = 15625, small_level_factor = 4;
 constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
 // Of a light set, beside always-on light: sets are off at times.
@@ -52,7 +52,8 @@ class Chooser {
 
     Expected<SiteChoice> run() {
         const uint32_t wanted = decideCounts();
-        const uint32_t rays = std::clamp(small_level_rays / std::max(wanted, 1u), site_rays_min, site_rays_max);
+        const uint32_t rays = std::clamp(small_level_places * settings_.site_rays / std::max(wanted, 1u),
+                                         settings_.site_rays, small_level_factor * settings_.site_rays);
         const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
         out_.blocks.push_back({allOver(wanted - at_lamps), rays});
         const auto lamps = static_cast<uint32_t>(lamps_.size());
