@@ -19,7 +19,7 @@ layout(set = 0, binding = 1) uniform utextureBuffer base;
 layout(set = 0, binding = 2) uniform utextureBuffer payload;        // receiver by receiver
 layout(set = 0, binding = 3) uniform utextureBuffer contributions;  // of each record
 layout(set = 0, binding = 4) uniform utextureBuffer first_record;   // per receiver, and one more
-layout(set = 0, binding = 5) uniform utextureBuffer weights;        // WorkTerm per contribution
+layout(set = 0, binding = 5) uniform utextureBuffer weights;        // per contribution, as a WorkTerm: whether it is on, weight
 layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray irradiance_pages;
 layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray direction_pages;
 
@@ -32,11 +32,11 @@ void main() {
     bool any = false;
     uint end = texelFetch(first_record, int(receiver) + 1).x;
     for (uint i = texelFetch(first_record, int(receiver)).x; i < end; ++i) {
-        vec3 weight = uintBitsToFloat(texelFetch(weights, int(texelFetch(contributions, int(i)).x)).yzw);
-        if (weight == vec3(0)) continue;
+        uvec4 term = texelFetch(weights, int(texelFetch(contributions, int(i)).x));
+        if (term.x == 0u) continue;
         any = true;
         uvec2 added = texelFetch(payload, int(i)).xy;
-        dimmer_blend_add(sum, added.x, added.y, weight, color_format);
+        dimmer_blend_add(sum, added.x, added.y, uintBitsToFloat(term.yzw), color_format);
     }
     if (any) record = dimmer_blend_encode(sum, color_format);
     uint address = texelFetch(addresses, int(receiver)).x;

@@ -34,6 +34,27 @@ glm::vec3 capDirection(uint32_t i, uint32_t n, float cos_least, glm::vec3 axis) 
     return t * (across * std::cos(phi)) + b * (across * std::sin(phi)) + axis * z;
 }
 
+// Points of surfaces, evenly over their area, in an order of no importance.
+std::vector<glm::vec3> pointsOfSurfaces(const RayScene& rays) {
+    std::vector<double> area_m2{0};  // up to each triangle
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+        const glm::vec3 a = rays.corner(t, 0), b = rays.corner(t, 1), c = rays.corner(t, 2);
+        area_m2.push_back(area_m2.back() + static_cast<double>(glm::length(glm::cross(b - a, c - a))) / 2);
+    }
+    constexpr double cell_m2 = static_cast<double>(LightGrid::cell_min_m) * static_cast<double>(LightGrid::cell_min_m);
+    constexpr double most = 1e6;
+    const auto count = static_cast<uint32_t>(std::clamp(area_m2.back() / cell_m2, double{surface_points}, most));
+    std::vector<glm::vec3> points;
+    for (uint32_t i = 0, t = 0; i < count && area_m2.back() > 0; ++i) {
+        const double at = area_m2.back() * (i + 0.5) / count;
+        while (area_m2[t + 1] < at) ++t;
+        const glm::vec2 u = sequence2d(i, 0);
+        const float across = std::sqrt(u.x);  // evenly over the triangle
+        points.push_back(rays.pointOn(t, across * (1 - u.y), across * u.y));
+    }
+    return points;
+}
+
 }  // namespace
 
 LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t> groups) {
@@ -55,7 +76,8 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
     grid_ = {rays.boundsMin(), rays.boundsMax(), cell_min_m};
 
     std::vector<std::vector<uint32_t>> reached(sought.size());
-    tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, sought[i]); });
+    const std::vector<glm::vec3> points = pointsOfSurfaces(rays);
+    tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, points, sought[i]); });
     first_.assign(grid_.count() + 1, 0);
     for (const auto& cells : reached)
         for (const uint32_t cell : cells) ++first_[cell + 1];
@@ -66,7 +88,8 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
         for (const uint32_t cell : reached[i]) lights_[end[cell]++] = sought[i];
 }
 
-std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t index) const {
+std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, std::span<const glm::vec3> surface_points_m,
+                                              uint32_t index) const {
     const PunctualLight& light = rays.scene().lights[index];
     const float cos_least = light.type == LightType::Spot ? light.cone_outer_cos : -1;
     // No further than the level goes, whatever range a file states.
@@ -76,11 +99,27 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, uint32_t ind
     // nothing is missed however far.
     const float spread = std::sqrt(2 * pi * (1 - cos_least) / static_cast<float>(light_probe_rays));
     std::vector<uint8_t> marks(grid_.count());
+    // How far a ray goes: through doors, as what is behind them is lit once they open, and through panes, however
+    // little they let by.
+    const auto reach = [&](glm::vec3 d, float length_m) {
+        return rays.reach(light.position_m + d * lamp_lift_m, d, length_m, Surfaces::Walls);
+    };
+    const auto mark = [&](glm::vec3 d, float length_m) {
+        grid_.mark(light.position_m + d * lamp_lift_m, d, length_m, spread, marks);
+    };
     for (uint32_t i = 0; i < light_probe_rays; ++i) {
-        // Through doors, as what is behind them is lit once they open, and through panes, however little they let by.
         const glm::vec3 d = capDirection(i, light_probe_rays, cos_least, light.direction);
-        const glm::vec3 from = light.position_m + d * lamp_lift_m;
-        grid_.mark(from, d, rays.reach(from, d, far_m, Surfaces::Walls), spread, marks);
+        mark(d, reach(d, far_m));
+    }
+    for (const glm::vec3 point : surface_points_m) {
+        const glm::vec3 way = point - light.position_m;
+        const float length_m = glm::length(way);
+        if (!(length_m > lamp_lift_m && length_m < far_m) || marks[grid_.at(point)]) continue;
+        const glm::vec3 d = way / length_m;
+        if (light.type == LightType::Spot && glm::dot(d, light.direction) < cos_least) continue;
+        const float as_near_as_there_m = 1e-3f + 1e-5f * length_m;
+        const float reached_m = reach(d, length_m);
+        if (reached_m + lamp_lift_m > length_m - as_near_as_there_m) mark(d, reached_m);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)

@@ -12,9 +12,10 @@
 namespace dimmer::cook {
 
 // Rays that each light sends out to find the cells that it reaches, evenly over the directions that it shines into: for
-// a point light 0.055 rad apart. Lost is what shines through openings between them, a 500,000th of lq_e2m3's light
-// (docs/decisions.md).
-inline constexpr uint32_t light_probe_rays = 4096;
+// a point light 0.055 rad apart. What shines through openings between them is looked for from the other end, from so
+// many points all over the level's surfaces, in large levels one for a cell's: what both miss is lost, less than a
+// 500,000th of lq_e2m3's light (docs/decisions.md).
+inline constexpr uint32_t light_probe_rays = 4096, surface_points = 8192;
 
 // A grid over the level; its cells list the lights that reach them, found by rays from the lights. Asked for
 // everywhere: lights baked in full (BakeMode::Full), since what they light is seen itself, directional ones, and those
@@ -39,7 +40,8 @@ class LightGrid {
     uint32_t identity(uint32_t light) const { return identity_[light]; }
 
    private:
-    std::vector<uint32_t> reachedCells(const RayScene& rays, uint32_t light) const;
+    std::vector<uint32_t> reachedCells(const RayScene& rays, std::span<const glm::vec3> surface_points_m,
+                                       uint32_t light) const;
 
     std::vector<uint32_t> identity_;  // per light
     std::vector<uint32_t> everywhere_;

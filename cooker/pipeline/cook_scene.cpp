@@ -53,11 +53,15 @@ Expected<void> findReceivers(const Profile& profile, const Quality& quality, Coo
 }
 
 // Of where things are. Entries of a cache name no nodes: this is said in every cook.
-void warnOfPlaces(const ChartedLevel& level, CookStats& stats) {
+void warnOfPlaces(const Receivers& at, CookStats& stats) {
+    const ChartedLevel& level = at.level;
     const auto buried = warningsOfBuriedLights(*level.rays);
     stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
     if (auto warning = farFromOrigin(*level.rays)) stats.warnings.push_back(std::move(*warning));
     if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
+    if (auto warning = tooSmallForTexels(level.scene, level.charts, at.texels))
+        stats.warnings.push_back(std::move(*warning));
+    std::ranges::move(narrowSpots(*level.rays, level.charts), std::back_inserter(stats.warnings));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));
@@ -118,7 +122,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         if (auto ok = findReceivers(profile, *quality, cache, at); !ok) return std::unexpected(ok.error());
         progress.advance(1);
         findTransfers(level.scene);
-        warnOfPlaces(level, stats);
+        warnOfPlaces(at, stats);
         progress.advance(1);
     }
     if (at.texels.size() == 0)
@@ -146,6 +150,9 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     }
     stats.rays += baked.rays;
     stats.bounces = baked.bounces;
+    double energy_lm = 0;
+    for (const TermReport& r : baked.reports) energy_lm += r.energy;
+    if (auto warning = allInTheDark(level.scene, energy_lm)) stats.warnings.push_back(std::move(*warning));
     for (const std::string& w : baked.warnings) stats.warnings.push_back(level.scene.file + ": " + w);
     PackData pack;
     {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer::cook {
 
@@ -46,6 +47,50 @@ std::optional<std::string> withoutLight(const Scene& scene) {
     return scene.file +
            ": has no light, and all of it comes out black; export it with punctual lights, or give it a sky or a "
            "material that shines";
+}
+
+std::optional<std::string> allInTheDark(const Scene& scene, double energy_lm) {
+    if (energy_lm > 0 || withoutLight(scene)) return {};
+    return scene.file +
+           ": none of its light that lightmaps store arrives at any surface, and all of it comes out black; something "
+           "may enclose the level (a dome of sky blocks the sun: 'dimmer_lighting': 'dynamic' leaves it out), or its "
+           "lights have an intensity of 0";
+}
+
+std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels) {
+    constexpr uint32_t padding = 1, few_texels = 3;
+    double all_m2 = 0, narrow_m2 = 0;
+    for (size_t i = 0; i < texels.size(); ++i) {
+        const Chart& chart = unwrap.charts[unwrap.face_chart[texels.face(i)]];
+        all_m2 += static_cast<double>(texels.area_m2[i]);
+        if (std::min(chart.width, chart.height) < few_texels + 2 * padding)
+            narrow_m2 += static_cast<double>(texels.area_m2[i]);
+    }
+    if (!(narrow_m2 > 0.5 * all_m2)) return {};
+    return fmt::format(
+        "{}: most of its surface lies on walls of less than {} texels' width, through which light leaks: is the level "
+        "in metres, as glTF has it? If so, take more texels per metre (lightmaps.texels_per_metre)",
+        scene.file, few_texels);
+}
+
+std::vector<std::string> narrowSpots(const RayScene& rays, const Unwrap& unwrap) {
+    constexpr float texels_min = 2;
+    std::vector<std::string> warnings;
+    for (const PunctualLight& light : rays.scene().lights) {
+        if (light.type != LightType::Spot || light.bake == BakeMode::None) continue;
+        const auto hit = rays.nearest(light.position_m, light.direction, far_away_m, 0, Surfaces::Walls);
+        const uint32_t face = hit ? unwrap.faceOf(hit->triangle, hit->back) : no_index;
+        if (face == no_index) continue;
+        const float tan = std::sqrt(1 - light.cone_outer_cos * light.cone_outer_cos) / light.cone_outer_cos;
+        const float across_m = 2 * hit->distance_m * tan, texel_m = std::sqrt(unwrap.texel_area_m2[face]);
+        if (!(light.cone_outer_cos > 0 && across_m < texels_min * texel_m)) continue;
+        warnings.push_back(fmt::format(
+            "{}: node '{}': its beam is {:.3g} m across where it meets a surface of {:.3g} m per texel: what "
+            "it sends back may be far off; widen it, or take more texels per metre there "
+            "(dimmer_texel_density)",
+            rays.scene().file, light.node, across_m, texel_m));
+    }
+    return warnings;
 }
 
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {

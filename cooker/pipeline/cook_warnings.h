@@ -1,6 +1,7 @@
 // What a cook says of a level that can be cooked, though not as somebody meant it.
 #pragma once
 
+#include <charts/texels.h>
 #include <pipeline/profile.h>
 #include <scene/scene.h>
 #include <trace/ray_scene.h>
@@ -21,6 +22,15 @@ std::optional<std::string> farFromOrigin(const RayScene& rays);
 
 // No lamp, no sky, nothing that shines: an exporter's lights are easily left out.
 std::optional<std::string> withoutLight(const Scene& scene);
+
+// Lights there are, and none of what packs store arrives: a sky dome stops the sun, say. `energy_lm`: of all that does.
+std::optional<std::string> allInTheDark(const Scene& scene, double energy_lm);
+
+// Most of the level is narrower than a few texels: it is in another unit, mostly.
+std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels);
+
+// Spots whose light meets a surface in a patch so narrow that texels' points are too few for it.
+std::vector<std::string> narrowSpots(const RayScene& rays, const Unwrap& unwrap);
 
 // Of the command line's settings for another quality, which do nothing.
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);

@@ -491,11 +491,12 @@ std::vector<FitValue> statesOf(const Scene& scene, const Sparse<ProbeTermLight>&
     tbb::parallel_for(size_t{0}, light.rows(), [&](size_t i) {
         for (const ProbeTermLight& l : light.row(i)) {
             const Term& term = terms[l.term];
-            if (!term.doors_open.empty()) continue;
-            const size_t half = wholes[term.group] % 2;
-            for (const size_t state : {size_t{0}, 1 + half})
+            const auto addTo = [&](size_t state) {
                 for (size_t k = 0; k < 9; ++k)
                     states[i][9 * state + k] += weights[term.group] * luminance(l.light.radiance[k]);
+            };
+            if (term.doors_closed.empty()) addTo(0);
+            if (term.doors_open.empty()) addTo(1 + wholes[term.group] % 2);
         }
     });
     return states;

@@ -2,6 +2,8 @@
 #include <scene/elements.h>
 
 #include <algorithm>
+#include <dimmer/pack.h>
+
 #include <glm/gtc/quaternion.hpp>
 
 namespace dimmer::cook {
@@ -12,7 +14,7 @@ constexpr std::ptrdiff_t combined_doors_max = 8;
 Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
     const auto name = extras.text("dimmer_light_set");
     if (!name) return std::unexpected(name.error());
-    const auto stated = extras.positive("dimmer_max_weight");
+    const auto stated = extras.positive("dimmer_max_weight", max_weight_limit);
     if (!stated) return std::unexpected(stated.error());
     if (!*name) return std::nullopt;
     const auto ok = checkElementName(context_, **name, "dimmer_light_set", extras.ownerOf("dimmer_light_set"));

@@ -87,9 +87,10 @@ Expected<std::optional<double>> Extras::number(std::string_view key) const {
     return value->GetNumberAsDouble();
 }
 
-Expected<std::optional<double>> Extras::positive(std::string_view key) const {
+Expected<std::optional<double>> Extras::positive(std::string_view key, double at_most) const {
     const auto value = number(key);
     if (value && *value && !(static_cast<float>(**value) > 0)) return wrongType(key, "a number greater than 0");
+    if (value && *value && **value > at_most) return wrongType(key, fmt::format("a number of {} at most", at_most));
     return value;
 }
 

@@ -25,7 +25,7 @@ class Extras {
     // Empty when no one states the key; an error naming owner and key when it has another type. Numbers are finite.
     Expected<std::optional<std::string>> text(std::string_view key) const;
     Expected<std::optional<double>> number(std::string_view key) const;
-    Expected<std::optional<double>> positive(std::string_view key) const;
+    Expected<std::optional<double>> positive(std::string_view key, double at_most = DBL_MAX) const;
     Expected<std::optional<std::vector<double>>> numbers(std::string_view key, size_t count) const;
     // true, false, 1 or 0; absent is false.
     Expected<bool> flag(std::string_view key) const;

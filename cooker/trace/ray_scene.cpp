@@ -46,11 +46,32 @@ struct Collector {
     }
 };
 
+// Of two skins of a wall in one plane, back to back, a ray meets the one that faces it. Farther apart than this they
+// are a wall with a thickness.
+float skinsApart(float distance_m) {
+    return std::max(1e-5f, 4e-6f * distance_m);
+}
+
 void leaveOut(const RTCFilterFunctionNArguments* args) {
     const auto* const ray = reinterpret_cast<const Collector*>(args->context);
     const auto* hit = reinterpret_cast<const RTCHit*>(args->hit);
     const uint32_t triangle = static_cast<const uint32_t*>(args->geometryUserPtr)[hit->primID];
     if (ray->triangles[triangle].model == ray->ignored) args->valid[0] = 0;
+}
+
+// Asks for what faces a ray alone.
+using TrianglesOfKinds = std::array<std::vector<uint32_t>, kinds>;
+struct Facing {
+    Collector collector;  // first, as above
+    const TrianglesOfKinds& triangle_of;
+};
+
+void leaveOutBacks(const RTCFilterFunctionNArguments* args) {
+    const auto* const asked = reinterpret_cast<const Facing*>(args->context);
+    const auto* const ray = reinterpret_cast<const RTCRay*>(args->ray);
+    const auto* const hit = reinterpret_cast<const RTCHit*>(args->hit);
+    const LevelTriangle& triangle = asked->collector.triangles[asked->triangle_of[hit->geomID][hit->primID]];
+    if (glm::dot(glm::vec3(ray->dir_x, ray->dir_y, ray->dir_z), triangle.normal) > 0) args->valid[0] = 0;
 }
 
 void collect(const RTCFilterFunctionNArguments* args) {
@@ -87,7 +108,7 @@ struct RayScene::Embree {
     Handle<RTCScene> scene_owner{rtcNewScene(device.get())};
     RTCScene scene = scene_owner.get();
     const LevelTriangle* triangles;
-    std::array<std::vector<uint32_t>, kinds> triangle_of;  // Embree primitive -> level triangle
+    TrianglesOfKinds triangle_of;  // Embree primitive -> level triangle
 
     Embree(const RayScene& level, Surfaces surfaces) : triangles(level.triangles().data()) {
         for (uint32_t t = 0; t < level.triangles().size(); ++t) {
@@ -99,7 +120,7 @@ struct RayScene::Embree {
         }
         for (unsigned kind = 0; kind < kinds; ++kind) attach(kind, level);
         // Robust: rays must not slip through the edges that closed rooms are made of.
-        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
         rtcCommitScene(scene);
         // Without memory a scene is empty, and would be all sky.
@@ -165,6 +186,17 @@ struct RayScene::Embree {
         Collector collector(leaves, triangles, ignored);
         rtcIntersect1(scene, &collector.context, &ray_hit);
         return ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    }
+
+    // A front in the plane of a back that was met. `ray_hit`: as it was where there is none.
+    void preferFront(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, uint32_t ignored) const {
+        const float distance_m = ray_hit.ray.tfar, apart_m = skinsApart(distance_m);
+        RTCRayHit front;
+        prepare(front, origin, direction, std::max(0.0f, distance_m - apart_m), distance_m + apart_m, mask_opaque);
+        Facing facing{Collector(nullptr, triangles, ignored), triangle_of};
+        facing.collector.context.filter = leaveOutBacks;
+        rtcIntersect1(scene, &facing.collector.context, &front);
+        if (front.hit.geomID != RTC_INVALID_GEOMETRY_ID) ray_hit = front;
     }
 
     bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask, uint32_t ignored,
@@ -263,6 +295,10 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     std::optional<Hit> found;
     if (among.intersect(r, origin, direction, 0, distance_max_m, mask_opaque | mask_transparent, ignored, leaves)) {
         found = hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, direction);
+        if (found->back && !scene_.materials[triangles_[found->triangle].material].double_sided) {
+            among.preferFront(r, origin, direction, ignored);
+            found = hitOf(among.triangle_of[r.hit.geomID][r.hit.primID], r.ray.tfar, r.hit.u, r.hit.v, direction);
+        }
         if (Embree::isTransparent(r.hit.geomID))
             found = throughLayers(among, {origin, direction, distance_max_m}, *found, seed, ignored, leaves);
     }

@@ -108,10 +108,19 @@ inline uint32_t encodeColor(ColorFormat format, float r, float g, float b) {
 inline std::array<float, 3> decodeColor(ColorFormat format, uint32_t code) {
     return format == ColorFormat::R11G11B10F ? decodeR11G11B10(code) : decodeE5B9G9R9(code);
 }
+// The same numbers with the smallest step that holds them, as the encoder has it.
+inline uint32_t canonicalE5B9G9R9(uint32_t code) {
+    constexpr uint32_t exponent = 1u << 27, upper_halves = 1u << 8 | 1u << 17 | 1u << 26;
+    while (code >= exponent && (code & upper_halves) == 0)
+        code = (code & ~(31u << 27)) << 1 | ((code & 31u << 27) - exponent);
+    return code;
+}
+
 // Executors see only what this returns. Every code of E5B9G9R9 is a finite number.
 inline TexelRecord canonical(ColorFormat format, const TexelRecord& record) {
-    if (format == ColorFormat::E5B9G9R9) return record;
-    return {canonicalR11G11B10(record.irradiance), record.direction};
+    return {format == ColorFormat::E5B9G9R9 ? canonicalE5B9G9R9(record.irradiance)
+                                            : canonicalR11G11B10(record.irradiance),
+            record.direction};
 }
 
 // The directional part of a texel: ambient share and the highlight's moment b (see above).

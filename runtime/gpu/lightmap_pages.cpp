@@ -240,10 +240,14 @@ Expected<void> LightmapPages::fill(const PackData& data, Transfer& transfer) {
     return transfer.run([&](VkCommandBuffer commands) { transition(commands, target, sampled()); });
 }
 
+// Each piece leaves the pages in the layout that shaders expect, whatever fails.
 Expected<void> LightmapPages::readArray(Transfer& transfer, VkImage image, std::vector<uint32_t>& texels) const {
+    const State source{VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                       VK_ACCESS_TRANSFER_READ_BIT};
     texels.resize(size_t{layers_} * height_ * width_);
     return forEachPiece([&](const VkBufferImageCopy& region, size_t first, size_t count) -> Expected<void> {
         DIMMER_TRY(transfer.run([&](VkCommandBuffer commands) {
+            transition(commands, sampled(), source);
             vkCmdCopyImageToBuffer(commands, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
                                    transfer.staging().buffer.get(), 1, &region);
             auto barrier = vkStruct<VkMemoryBarrier>(VK_STRUCTURE_TYPE_MEMORY_BARRIER);
@@ -251,6 +255,7 @@ Expected<void> LightmapPages::readArray(Transfer& transfer, VkImage image, std::
             barrier.dstAccessMask = VK_ACCESS_HOST_READ_BIT;
             vkCmdPipelineBarrier(commands, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_PIPELINE_STAGE_HOST_BIT, 0, 1, &barrier,
                                  0, nullptr, 0, nullptr);
+            transition(commands, source, sampled());
         }));
         std::memcpy(&texels[first], transfer.staging().mapped, count * sizeof(uint32_t));
         return {};
@@ -258,15 +263,9 @@ Expected<void> LightmapPages::readArray(Transfer& transfer, VkImage image, std::
 }
 
 Expected<Runtime::Pages> LightmapPages::read(Transfer& transfer) const {
-    const State source{VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, VK_PIPELINE_STAGE_TRANSFER_BIT,
-                       VK_ACCESS_TRANSFER_READ_BIT};
     Runtime::Pages pages;
-    DIMMER_TRY(transfer.run([&](VkCommandBuffer commands) { transition(commands, sampled(), source); }));
-    // Whatever fails, the pages must be left in the layout that shaders expect.
-    auto copied = readArray(transfer, irradiance_.image.image.get(), pages.irradiance);
-    if (copied) copied = readArray(transfer, direction_.image.image.get(), pages.direction);
-    DIMMER_TRY(transfer.run([&](VkCommandBuffer commands) { transition(commands, source, sampled()); }));
-    DIMMER_TRY(std::move(copied));
+    DIMMER_TRY(readArray(transfer, irradiance_.image.image.get(), pages.irradiance));
+    DIMMER_TRY(readArray(transfer, direction_.image.image.get(), pages.direction));
     return pages;
 }
 

@@ -99,7 +99,7 @@ void GatherBlender::write(const Planner& planner, uint32_t) {
     auto* weights = reinterpret_cast<WorkTerm*>(weights_.buffer.mapped);
     for (uint32_t k = 0; k < planner.contributionCount(); ++k) {
         const Weight& w = planner.plannedWeight(k);
-        weights[k] = {0, w.r * weight_scale_, w.g * weight_scale_, w.b * weight_scale_};
+        weights[k] = {isOn(w), w.r * weight_scale_, w.g * weight_scale_, w.b * weight_scale_};
     }
 }
 

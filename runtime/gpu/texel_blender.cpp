@@ -77,8 +77,9 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
         vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
     vkGetPhysicalDeviceProperties2(vulkan.physical_device, &properties);
     const VkPhysicalDeviceLimits& limits = properties.properties.limits;
-    DIMMER_TRY(checkTexelLimits(limits, allocations.maxMemoryAllocationSize, placesOf(data), planner,
-                                options.records_bytes_max));
+    DevicePlaces places = placesOf(data);
+    DIMMER_TRY(
+        checkTexelLimits(limits, allocations.maxMemoryAllocationSize, places, planner, options.records_bytes_max));
     TexelBlender blender;
     blender.groups_x_max_ = limits.maxComputeWorkGroupCount[0];
     blender.per_combination_ = options.mode == UpdateMode::PerCombination;
@@ -86,14 +87,14 @@ Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const P
     if (!records) return std::unexpected(std::move(records.error()));
     blender.records_ = std::move(*records);
     DIMMER_TRY(blender.uploadRecords(data, transfer, options.load_records));
-    DIMMER_TRY(blender.createTables(vulkan, data, transfer));
+    DIMMER_TRY(blender.createTables(vulkan, data, std::move(places), transfer));
     for (uint32_t i = 0; i < options.frames_in_flight; ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
     DIMMER_TRY(blender.createKernel(vulkan, data, planner, page_sets));
     return blender;
 }
 
-Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer) {
-    DevicePlaces places = placesOf(data);
+Expected<void> TexelBlender::createTables(const VulkanContext& vulkan, const PackData& data, DevicePlaces places,
+                                          Transfer& transfer) {
     const auto receivers = receiverRuns(data, places);
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, places.receivers * sizeof(TexelRecord), wide_format,
                                 fillFrom(receivers, [&](uint32_t i) { return baseAt(data, i); })),

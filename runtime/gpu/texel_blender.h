@@ -34,7 +34,8 @@ class TexelBlender : public TexelExecutor {
         TexelBuffer items, terms;
     };
 
-    Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
+    Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, DevicePlaces places,
+                                Transfer& transfer);
     Expected<void> uploadRecords(const PackData& data, Transfer& transfer, bool all);
     Expected<void> createWork(const VulkanContext& vulkan, const Planner& planner);
     Expected<void> createKernel(const VulkanContext& vulkan, const PackData& data, const Planner& planner,

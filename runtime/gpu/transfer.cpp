@@ -57,9 +57,11 @@ Expected<void> Transfer::run(const std::function<void(VkCommandBuffer)>& record)
     submit.commandBufferCount = 1;
     submit.pCommandBuffers = &commands_;
     const VkFence fence = fence_.get();
-    DIMMER_VK(vkQueueSubmit, vulkan_.queue, 1, &submit, fence);
-    DIMMER_VK(vkWaitForFences, vulkan_.device, 1, &fence, VK_TRUE, std::numeric_limits<uint64_t>::max());
     DIMMER_VK(vkResetFences, vulkan_.device, 1, &fence);
+    DIMMER_VK(vkQueueSubmit, vulkan_.queue, 1, &submit, fence);
+    const VkResult waited = vkWaitForFences(vulkan_.device, 1, &fence, VK_TRUE, std::numeric_limits<uint64_t>::max());
+    // The device must be done with all of this in any case.
+    if (waited != VK_SUCCESS) DIMMER_VK(vkQueueWaitIdle, vulkan_.queue);
     return {};
 }
 

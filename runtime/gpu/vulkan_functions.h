@@ -74,6 +74,7 @@
     X(vkGetQueryPoolResults)                    \
     X(vkMapMemory)                              \
     X(vkQueueSubmit)                            \
+    X(vkQueueWaitIdle)                          \
     X(vkResetFences)                            \
     X(vkUpdateDescriptorSets)                   \
     X(vkWaitForFences)                          \

@@ -76,7 +76,10 @@ class Reader {
         then([&] { return readProbes(d); });
         then([&] { return table(ChunkType::Meshes, [&](ByteReader& in) { readMeshes(in, d); }); });
         then([&] { return table(ChunkType::Viewpoints, [&](ByteReader& in) { readViewpoints(in, d); }); });
-        then([&] { return table(ChunkType::ModelMeshes, [&](ByteReader& in) { readModelMeshes(in, d); }); });
+        then([&] {
+            const uint64_t decoded_max = decodedMax(ChunkType::ModelMeshes);
+            return table(ChunkType::ModelMeshes, [&](ByteReader& in) { readModelMeshes(in, decoded_max, d); });
+        });
         then([&] { return table(ChunkType::Models, [&](ByteReader& in) { readModels(in, d); }); });
         then([&] { return table(ChunkType::Settings, [&](ByteReader& in) { d.settings_json = in.getString(); }); });
         then([&] { return checkNothingLeft(); });
@@ -387,7 +390,13 @@ class Reader {
         }
     }
 
-    static void readModelMeshes(ByteReader& in, PackData& d) {
+    // A chunk's bytes unfold no further because they are encoded twice.
+    uint64_t decodedMax(ChunkType type) const {
+        const auto found = by_name_.find({static_cast<uint32_t>(type), 0});
+        return found == by_name_.end() ? 0 : expansion_max * found->second->stored_bytes;
+    }
+
+    static void readModelMeshes(ByteReader& in, uint64_t decoded_max, PackData& d) {
         const uint32_t count = in.get<uint32_t>();
         if (!in.fits(count, 72)) return in.fail();
         for (uint32_t i = 0; i < count && in.ok(); ++i) {
@@ -399,9 +408,15 @@ class Reader {
             m.emission_cd_m2 = in.get<std::array<float, 3>>();
             m.emission_set = optionalIndex(in);
             const uint32_t vertex_count = in.get<uint32_t>();
-            auto vertices = decodeVertices(vertex_count, in.getArray<std::byte>());
+            const auto encoded_vertices = in.getArray<std::byte>();
             const uint32_t index_count = in.get<uint32_t>();
-            auto indices = decodeIndices(index_count, in.getArray<std::byte>());
+            const auto encoded_indices = in.getArray<std::byte>();
+            const uint64_t decoded =
+                uint64_t{vertex_count} * sizeof(ModelVertex) + uint64_t{index_count} * sizeof(uint32_t);
+            if (decoded > decoded_max) return in.fail();
+            decoded_max -= decoded;
+            auto vertices = decodeVertices(vertex_count, encoded_vertices);
+            auto indices = decodeIndices(index_count, encoded_indices);
             if (!vertices || !indices) return in.fail();
             m.vertices = std::move(*vertices);
             m.indices = std::move(*indices);

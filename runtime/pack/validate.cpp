@@ -45,7 +45,7 @@ Expected<void> validateElements(const PackData& d) {
         if (doors && e.kind == ElementKind::LightSet) return unusable("light set '{}' stands behind a door", e.name);
         if (e.name.empty() || !names.emplace(e.kind, e.name).second)
             return unusable("the element name '{}' is empty or used twice", e.name);
-        if (!std::isfinite(e.max_weight) || e.max_weight <= 0)
+        if (!(e.max_weight > 0 && e.max_weight <= max_weight_limit))
             return unusable("element '{}' has a largest weight of {}", e.name, e.max_weight);
     }
     return {};
@@ -140,8 +140,10 @@ Expected<void> validateBatchTiles(const PackData& d) {
             BatchTiles tiles(d.page_width);
             for (uint32_t i = 0; i < batch.receiver_count; ++i)
                 if (!tiles.add(d.addresses[batch.first_receiver + i]))
-                    return unusable("batch {} lies in more than {} tiles of one page, or in a third or fourth far off",
-                                    b, batch_tiles_max);
+                    return unusable(
+                        "batch {} lies on two pages, in more than {} tiles, or in a third or fourth that does not come "
+                        "soon after the one before",
+                        b, batch_tiles_max);
             if (batch.receiver_count % 2 != 0 && b + 1 < c.first_batch + c.batch_count)
                 return unusable("batch {} has an odd number of receivers and is not its cluster's last", b);
         }

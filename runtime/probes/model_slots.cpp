@@ -25,8 +25,9 @@ void extend(Box& box, const Vec3& p) {
     }
 }
 
+// As a walk through the grid begins: what is not a number is the lower end.
 Vec3 clamped(Vec3 p, const Box& box) {
-    for (size_t i = 0; i < 3; ++i) p[i] = std::clamp(p[i], box.min_m[i], box.max_m[i]);
+    for (size_t i = 0; i < 3; ++i) p[i] = p[i] > box.min_m[i] ? std::min(p[i], box.max_m[i]) : box.min_m[i];
     return p;
 }
 

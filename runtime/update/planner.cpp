@@ -9,10 +9,6 @@
 namespace dimmer {
 namespace {
 
-bool isOn(const Weight& w) {
-    return w.r != 0 || w.g != 0 || w.b != 0;
-}
-
 // By how much the weights of any channel differ.
 float distance(const Weight& a, const Weight& b) {
     return std::max({std::abs(a.r - b.r), std::abs(a.g - b.g), std::abs(a.b - b.b)});
@@ -82,8 +78,7 @@ Weight Planner::product(const Contribution& contribution) const {
     for (uint32_t door : contribution.doors_open) doors *= elements_[door].r;
     for (uint32_t door : contribution.doors_closed) doors *= 1.0f - elements_[door].r;
     const Weight dim = contribution.light_set ? elements_[*contribution.light_set] : Weight();
-    const auto bounded = [doors](float channel) { return std::min(channel * doors, planned_weight_max); };
-    return {bounded(dim.r), bounded(dim.g), bounded(dim.b)};
+    return {dim.r * doors, dim.g * doors, dim.b * doors};
 }
 
 // Of contributions alone, and of those alone whose weight is another one now.

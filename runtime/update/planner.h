@@ -35,8 +35,10 @@ struct WorkList {
     std::array<WorkGroup, work_group_count> groups{};
 };
 
-// Weights above this are taken as this: every texel they touch is as bright as the format goes.
-inline constexpr float planned_weight_max = 0x1p27f;
+// Whether a contribution is added at all: a texel without any is its base, to the bit.
+inline bool isOn(const Weight& w) {
+    return w.r != 0 || w.g != 0 || w.b != 0;
+}
 
 // Plans the updates of one set of pages. Each cluster is either as the weights say, or has batches that wait: which do,
 // is a range of its batches, taken up round robin, so that a limit per plan starves none.

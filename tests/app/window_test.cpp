@@ -79,7 +79,7 @@ TEST_F(SampleWindowGpu, PlaysAScriptUnderTheValidationLayers) {
 TEST_F(SampleWindowGpu, TakesOddNamesAndMaxima) {
     PackData data = samplePack();
     data.elements[0].name = "100% a ## b";
-    data.elements[0].max_weight = 3e38f;
+    data.elements[0].max_weight = max_weight_limit;
     data.elements[1].name = "%s%n";
     data.elements[1].max_weight = 1e-30f;
     data.viewpoints[0].name = "";

@@ -188,6 +188,29 @@ TEST(LightGrid, NothingIsLostThroughADoorway) {
     EXPECT_LT(with.rays, without.rays);
 }
 
+// A hatch of 0.8 x 0.6 m, 25 m from the lamp: a 4,000th of the directions around it, between two of its rays as like as
+// not. What it lights behind is found from there, wherever the lamp stands.
+TEST(LightGrid, NothingIsLostThroughAHatchFarAway) {
+    size_t lit_behind = 0;
+    for (const glm::vec3 lamp : {glm::vec3(-12, 0.5f, -3), glm::vec3(-12.3f, 1.1f, 0), glm::vec3(-11, -0.7f, 4.2f)}) {
+        Scene scene;
+        addBox(scene, {16, 2, 6}, addMaterial(scene, lambert(0.5f)));
+        Material wall = lambert(0.5f);
+        wall.double_sided = true;
+        const uint32_t grey = addMaterial(scene, wall);
+        addQuad(scene, "left", {12, 0, -3.2f}, {0, 2, 0}, {0, 0, 2.8f}, grey);
+        addQuad(scene, "right", {12, 0, 3.2f}, {0, 2, 0}, {0, 0, 2.8f}, grey);
+        addQuad(scene, "above", {12, 1.15f, 0}, {0, 0.85f, 0}, {0, 0, 0.4f}, grey);
+        addQuad(scene, "below", {12, -1.15f, 0}, {0, 0.85f, 0}, {0, 0, 0.4f}, grey);
+        addPointLight(scene, lamp, 800, BakeMode::Indirect);
+        const BakedScene b(scene, 4, 4);
+        const Direct with = directOf(b, true), without = directOf(b, false);
+        EXPECT_EQ(with.rows, without.rows) << lamp.x << " " << lamp.y << " " << lamp.z;
+        for (size_t i = 0; i < b.texels.size(); ++i) lit_behind += b.place(i).x > 12.1f && !without.rows[i].empty();
+    }
+    EXPECT_GT(lit_behind, 30u);
+}
+
 // A slit of 1 cm is 0.001 rad: most lamps' rays miss it, and on their own side nothing is lost all the same.
 TEST(LightGrid, ThroughASlitLightMayBeLostButNotBeforeIt) {
     const BakedScene b(lampsBehindAWall(0.01f), 3, 2);

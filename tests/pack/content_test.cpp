@@ -21,6 +21,30 @@ struct ContentFault {
     std::string message;
 };
 
+// Vertices that their codec unfolds 64 times, of bytes that zstd unfolds some thousand times: 2 kB become 110 MB.
+void unfoldTwice(PackFile& file) {
+    constexpr uint32_t blocks = 1 << 14, block_bytes = 4 * 20, tail_bytes = 32;  // of 256 vertices
+    ChunkContent& meshes = file.chunk("MODM");
+    meshes.flags = 0;
+    meshes.shuffle = 1;
+    meshes.bytes.assign(8 + 12 * sizeof(float), {});
+    meshes.write(0, 1u);
+    size_t at = meshes.bytes.size();
+    const auto put = [&](auto value) {
+        meshes.write(at, value);
+        at += sizeof value;
+    };
+    put(UINT32_MAX);  // no set
+    put(blocks * 256);
+    put(1 + blocks * block_bytes + tail_bytes);
+    put(uint8_t{0xa0});
+    meshes.bytes.resize(at += blocks * block_bytes + tail_bytes);
+    put(0u);
+    put(17u);
+    put(uint8_t{0xe1});
+    meshes.bytes.resize(at + 16);
+}
+
 // Byte offsets are those of docs/format.md.
 const ContentFault content_faults[] = {
     {"elements: a count past the chunk", [](PackFile& f) { f.chunk("ELEM").write(0, 7u); }, "ELEM is malformed"},
@@ -83,6 +107,7 @@ const ContentFault content_faults[] = {
     {"model meshes: no such set", [](PackFile& f) { f.chunk("MODM").write(62, 4u); }, "no such light set"},
     {"model meshes: more vertices", [](PackFile& f) { f.chunk("MODM").write(66, 300u); }, "MODM is malformed"},
     {"model meshes: a huge number", [](PackFile& f) { f.chunk("MODM").write(66, UINT32_MAX); }, "MODM is malformed"},
+    {"model meshes: more than their bytes unfold to", unfoldTwice, "MODM is malformed"},
     {"model meshes: another codec", [](PackFile& f) { f.chunk("MODM").write(74, std::byte{0}); }, "MODM is malformed"},
     {"models: a huge count", [](PackFile& f) { f.chunk("MODL").write(0, UINT32_MAX); }, "MODL is malformed"},
     {"models: a count alone", [](PackFile& f) { f.chunk("MODL").bytes.resize(4); }, "MODL is malformed"},

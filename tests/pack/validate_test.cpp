@@ -57,6 +57,7 @@ const Fault element_faults[] = {
     {"a door's name twice", [](PackData& d) { d.elements[5].name = "door0"; }, "'door0' is empty or used twice"},
     {"weight NaN", [](PackData& d) { d.elements[1].max_weight = nan; }, "element 'set1' has a largest weight"},
     {"weight infinite", [](PackData& d) { d.elements[1].max_weight = infinity; }, "element 'set1'"},
+    {"weight beyond all", [](PackData& d) { d.elements[1].max_weight = 1.01e8f; }, "a largest weight of 101000000"},
     {"weight 0", [](PackData& d) { d.elements[1].max_weight = 0; }, "element 'set1' has a largest weight of 0"},
     {"weight negative", [](PackData& d) { d.elements[1].max_weight = -2; }, "element 'set1'"},
 };
@@ -156,10 +157,10 @@ const Fault address_faults[] = {
      [](PackData& d) {
          std::ranges::sort(d.addresses, {}, [](uint32_t a) { return std::pair(TexelAddress::x(a) % 8, a); });
      },
-     "in more than 4 tiles of one page, or"},
+     "in more than 4 tiles, or"},
     {"a batch on two pages",
      [](PackData& d) { d.addresses[d.clusters[clusterWith(d, 65, 1, 2)].first_receiver + 1] ^= 1u << 24; },
-     "in more than 4 tiles of one page"},
+     "lies on two pages,"},
     {"an odd batch within its cluster",
      [](PackData& d) {
          size_t b = 0;  // a full one, followed by one with room, of the same cluster

@@ -1,6 +1,8 @@
 // What it takes to fit a budget: predictions against what really happens.
 #include <app/process.h>
+#include <bake/baked_scene.h>
 #include <bake/sampling.h>
+#include <bake/test_scenes.h>
 #include <charts/texels.h>
 #include <dimmer/cpu_runtime.h>
 #include <fmt/format.h>
@@ -407,6 +409,49 @@ TEST(WithoutLight, IsSaidOfLevelsThatStayBlack) {
     sky.sky_radiance_cd_m2 = {0, 0, 1};
     panel.materials[0].emission_cd_m2 = {1, 0, 0};
     for (const Scene& lit : {lamp, sky, panel}) EXPECT_FALSE(withoutLight(lit));
+}
+
+TEST(AllInTheDark, IsSaidWhereLightsLightNothing) {
+    Scene scene;
+    scene.file = "level.glb";
+    scene.lights.emplace_back();
+    EXPECT_FALSE(allInTheDark(scene, 1e-9));
+    ASSERT_TRUE(allInTheDark(scene, 0));
+    EXPECT_THAT(*allInTheDark(scene, 0), testing::AllOf(HasSubstr("level.glb: "), HasSubstr("black")));
+    scene.lights.clear();
+    EXPECT_FALSE(allInTheDark(scene, 0)) << "said already";
+}
+
+// A room of 4 x 2.4 x 4 m in metres, decimetres and centimetres, at 4 texels per metre.
+TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
+    for (const float scale : {1.0f, 0.1f, 0.01f}) {
+        Scene scene;
+        scene.file = "level.glb";
+        addBox(scene, glm::vec3(2, 1.2f, 2) * scale, addMaterial(scene, lambert(0.5f)));
+        const BakedScene b(scene, 4, 4);
+        const auto warning = tooSmallForTexels(b.scene, b.charts, b.texels);
+        EXPECT_EQ(warning.has_value(), scale < 1) << scale;
+        if (!warning) continue;
+        EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("in metres,")));
+    }
+}
+
+// 2.6 m over a floor of 25 cm a texel: beams of 2.6, 0.52 and 0.1 m across.
+TEST(NarrowSpots, AreThoseThatMeetHardlyATexel) {
+    Scene scene;
+    scene.file = "level.glb";
+    addFloor(scene, 4, addMaterial(scene, lambert(0.5f)));
+    for (const float tan : {0.5f, 0.1f, 0.02f}) {
+        PunctualLight& spot = addPointLight(scene, {0, 2.6f, 0}, 100, BakeMode::Indirect);
+        spot.node = fmt::format("beam {}", tan);
+        spot.type = LightType::Spot;
+        spot.direction = {0, -1, 0};
+        spot.cone_outer_cos = 1 / std::sqrt(1 + tan * tan);
+    }
+    const BakedScene b(scene, 4, 4);
+    const auto warnings = narrowSpots(*b.rays, b.charts);
+    ASSERT_EQ(warnings.size(), 1u);
+    EXPECT_THAT(warnings[0], testing::AllOf(HasSubstr("node 'beam 0.02'"), HasSubstr("0.104 m across")));
 }
 
 TEST(FarFromOrigin, IsSaidOfLevelsFarOff) {

@@ -101,5 +101,20 @@ TEST(Sites, PlacementSeesSetsAsATwentiethOfWhatIsAlwaysOn) {
     EXPECT_NEAR(all, always_and_hall + bulbs, 1e-6 * all);
 }
 
+// All light is seen with the doors open, or a room that is lit through one would get hardly a probe; halves of the sets
+// with the doors closed.
+TEST(Sites, PlacementSeesDoorsOpenAndClosed) {
+    const std::vector<Term> terms = {{0, {}, {}}, {0, {1}, {}}, {0, {}, {1}}, {0, {1}, {0}}};
+    std::vector<ProbeTermLight> row(4);
+    for (uint32_t t = 0; t < 4; ++t) {
+        row[t].term = t;
+        row[t].light.radiance[0] = glm::vec3(std::pow(10.0f, static_cast<float>(t)));
+    }
+    Sparse<ProbeTermLight>::Builder rows(1);
+    rows.put(0, row);
+    const FitValue states = statesOf({}, rows.finish(), terms, std::vector<SiteRow>{{0, 0}})[0];
+    EXPECT_NEAR(states[0] / states[9], (1 + 10) / (1.0 + 100), 1e-6);  // free and open; free and closed
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -20,7 +20,7 @@ void agreesWithSingleTexels(bool hostile) {
                 record = hostile ? TexelRecord{static_cast<uint32_t>(random()), static_cast<uint32_t>(random())}
                                  : test::randomRecord(random, 1.0f / 64);
             float w[3];
-            // Up to planned_weight_max, 2^27; hostile ones down to where products are denormal numbers.
+            // Up to 2^27, more than max_weight_limit; hostile ones down to where products are denormal numbers.
             for (float& channel : w)
                 channel = weightScale(format) *
                           (hostile ? std::exp2(test::uniform(random, -120, 27)) : test::uniform(random, 0, 2));

@@ -114,9 +114,12 @@ class DevicePlacesGpu : public test::GpuTest {};
 // Steps with every bit set and none, from first tiles at either end: the kernel's bits of places against addresses.
 TEST_F(DevicePlacesGpu, GpuFindsTilesAsFarApartAsABatchMayHave) {
     std::vector<uint32_t> addresses;
-    for (const auto& tiles : {std::array{8703u, 5u, 4100u, 8195u}, {0u, 8704u, 8705u, 9215u}, {1u, 3u, 4098u, 4099u}})
+    uint32_t shift = 0;  // each batch has places of its own
+    for (const auto& tiles : {std::array{0u, 8704u, 8705u, 9215u}, {8703u, 5u, 4100u, 8195u}, {1u, 3u, 4098u, 4099u}}) {
         for (const uint32_t tile : tiles)
-            for (uint32_t i = 0; i < 16; ++i) addresses.push_back(addressIn(tile, 7 - i % 4, i / 2));
+            for (uint32_t i = 0; i < 16; ++i) addresses.push_back(addressIn(tile, (7 - i % 4 + shift) % 8, i / 2));
+        ++shift;
+    }
     const Pack pack = test::packOf(packAt(addresses, page_side_max, 18 * tile_side));
     ASSERT_THAT(sizesOf(pack.data().batches), ElementsAre(64, 64, 64));
     Runtime gpu = runtimeOf(pack);

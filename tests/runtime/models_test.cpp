@@ -213,6 +213,28 @@ TEST(Models, OfNextToNoSizeHaveSlotsOfNumbers) {
     EXPECT_NEAR(sampler.sample(*runtime.modelSlot(model), {5, 0, 0}, {0, 1, 0})[1], expected, 0.005f * expected);
 }
 
+// Corners that are no numbers (infinity less infinity): the walk takes them for the lower end of the grid, and so must
+// whoever asks which models a change of light concerns.
+TEST(Models, WhoseCornersAreNoNumbersFollowTheLightWhereTheyAreTaken) {
+    PackData data = gradientPack();
+    test::addLightOnProbes(data, 0, encodeE5B9G9R9(9, 9, 9), [](glm::vec3 p) { return p.x < 3; });
+    const Pack pack = packOf(std::move(data));
+    CpuRuntime runtime(pack, 1, 64), fresh(pack, 1, 64);
+    const ModelGrid flat{{10, 10, 0}, {10, 10, 1}, {1, 1, 2}};
+    const Transform beyond{{{{3e38f, -3e38f, 0, 0}, {0, 1, 0, -8}, {0, 0, 1, 2}}}};
+    const Model model = *runtime.addModel(flat, beyond);
+    runtime.update();
+    for (CpuRuntime* either : {&runtime, &fresh}) ASSERT_TRUE(either->apply("set0=0.5"));
+    const Model again = *fresh.addModel(flat, beyond);
+    EXPECT_EQ(runtime.update().probes_resampled, 2u);
+    fresh.update();
+    const uint32_t first = runtime.modelSlot(model)->first_probe;
+    ASSERT_EQ(first, fresh.modelSlot(again)->first_probe);
+    constexpr size_t words = sizeof(ProbeRecord) / sizeof(uint32_t);
+    const auto lightOf = [&](const CpuRuntime& of) { return of.probes().subspan(words * first, 2 * words); };
+    EXPECT_TRUE(std::ranges::equal(lightOf(runtime), lightOf(fresh)));
+}
+
 TEST(Models, APackWithoutAGridKeepsNoRoomForThem) {
     test::Random random(4);
     PackData data = test::randomPack(4);

@@ -71,6 +71,22 @@ TEST(TexelLimits, RecordsThatAreNeverLoadedTogetherNeedNoRoomTogether) {
     }
 }
 
+// Fewer than the device has numbers for, whatever it has memory for.
+TEST(TexelLimits, MoreReceiversThanBatchesCanNameAreRefused) {
+    const PackData data = test::randomPack(79);
+    DevicePlaces places = placesOf(data);
+    const Planner planner(data);
+    VkPhysicalDeviceLimits limits{};
+    limits.maxTexelBufferElements = UINT32_MAX;
+    places.receivers = (1u << 28) - 1;
+    EXPECT_TRUE(checkTexelLimits(limits, UINT64_MAX, places, planner, 0));
+    places.receivers = 1u << 28;
+    const auto refused = checkTexelLimits(limits, UINT64_MAX, places, planner, 0);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, HasSubstr("268435456 receivers; this runtime takes fewer than"));
+}
+
 // Some devices read texel buffers of any size and allocate less at once.
 TEST(TexelLimits, RecordsLargerThanOneAllocationAreRefused) {
     const PackData data = test::randomPack(79);

@@ -145,13 +145,13 @@ TEST_P(Stability, TheOrderOfClustersAndBatchesIsNoPartOfTheResult) {
     }
 }
 
-// Denormal weights, weights next to the edges, the largest floats: whatever is accepted gives finite codes, and the
+// Denormal weights, weights next to the edges, the largest: whatever is accepted gives finite codes, and the
 // exact light where it fits the format.
 TEST_P(Stability, WeightsOnTheEdgeGiveFiniteLight) {
     PackData data = test::randomPack(35, {.doors = 1, .color_format = GetParam()});
-    data.elements[2].max_weight = std::numeric_limits<float>::max();
+    data.elements[2].max_weight = max_weight_limit;
     CpuRuntime runtime(packOf(std::move(data)));
-    const float one_up = std::nextafter(2.0f, 3.0f), largest = std::numeric_limits<float>::max();
+    const float one_up = std::nextafter(2.0f, 3.0f), largest = max_weight_limit;
     EXPECT_FALSE(runtime.setWeight(LightSet{0}, one_up));
     for (const float w : {std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::min(),
                           std::nextafter(2.0f, 0.0f), 2.0f}) {

@@ -116,6 +116,17 @@ TEST(SharedExponent, CodesDecodeByDefinitionAndComeBack) {
     }
 }
 
+TEST(SharedExponent, ACanonicalCodeIsTheOneThatTheEncoderWouldWrite) {
+    test::Random random(12);
+    for (int i = 0; i < 200000; ++i) {
+        // Of small mantissas, which other codes stand for as well.
+        const uint32_t mask = 0x1ffu >> test::pick(random, 0, 9), mantissas = mask | mask << 9 | mask << 18;
+        const auto code = static_cast<uint32_t>(random()) & (mantissas | 31u << 27);
+        const auto [r, g, b] = decodeE5B9G9R9(code);
+        ASSERT_EQ(canonicalE5B9G9R9(code), encodeE5B9G9R9(r, g, b)) << std::hex << code;
+    }
+}
+
 TEST(SharedExponent, RoundsEachChannelToTheNearestStepOfTheLargest) {
     test::Random random(12);
     for (int i = 0; i < 100000; ++i) {
@@ -278,7 +289,8 @@ TEST(TexelBlend, HostileRecordsAndWeightsGiveCanonicalCodes) {
         TexelBlend blend;
         TexelBlend<ColorFormat::E5B9G9R9> shared;
         for (uint32_t terms = test::pick(random, 1, 40); terms > 0; --terms) {
-            // Up to planned_weight_max, and down to where the product with the scale is a denormal number.
+            // Up to 2^27, more than max_weight_limit, and down to where the product with the scale is a denormal
+            // number.
             const float w = std::exp2(test::uniform(random, -149, 127));
             const TexelRecord record{static_cast<uint32_t>(random()), static_cast<uint32_t>(random())};
             blend.add(record, w, w, w);

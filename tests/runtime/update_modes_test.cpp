@@ -69,6 +69,30 @@ TEST_P(UpdateModes, GpuPagesHoldTheBaseAgainWhenAllIsOff) {
     expectEqualPages(gpu, CpuRuntime(pack));
 }
 
+// Two doors all but closed: their product times the format's own scale is no float but 0, the light is on all the same.
+TEST_P(UpdateModes, GpuPagesAreThoseOfTheCpuForWeightsThatVanish) {
+    PackData data = test::emptyPack(1, 2);
+    data.color_format = ColorFormat::E5B9G9R9;
+    data.page_count = 1;
+    data.page_width = data.page_height = 16;
+    data.contributions.assign(1, {});
+    data.contributions[0].doors_open = {1, 2};
+    test::Random random(23);
+    const test::ClusterPlan plans[] = {{{0}, 40}};
+    test::fillPack(data, plans, random);
+    // Black with a direction of its own, which encoding loses: so it is seen whether it was encoded.
+    for (TexelRecord& base : data.base_pages) base = {0, 0x06496309};
+    const Pack pack = packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack);
+    CpuRuntime cpu(pack);
+    for (const char* state : {"door:door0=1e-21,door:door1=1e-21", "door:door0=1e-30,door:door1=1e-30"}) {
+        ASSERT_TRUE(gpu.apply(state) && cpu.apply(state)) << state;
+        ASSERT_TRUE(gpu.submit());
+        cpu.update();
+        expectEqualPages(gpu, cpu);
+    }
+}
+
 std::string nameOf(const testing::TestParamInfo<UpdateMode>& mode) {
     constexpr std::array names = {"WorkList", "PerCombination", "Gather", "Scatter"};
     return names[static_cast<size_t>(mode.param)];

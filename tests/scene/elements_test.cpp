@@ -203,8 +203,8 @@ TEST(SceneElements, ASetWithoutLightsIsRefused) {
     expectBadInput(dull_mesh.import(), {"node 'floor'", "mesh 0", "hall"});
 }
 
-TEST(SceneElements, MaxWeightMustBePositive) {
-    for (const json& bad : {json(0), json(-1), json("2"), json(1e39), json(1e-60)})
+TEST(SceneElements, MaxWeightMustBePositiveAndOfThisWorld) {
+    for (const json& bad : {json(0), json(-1), json("2"), json(1.01e8), json(1e39), json(1e-60)})
         expectBadInput(levelWithLamp({{"dimmer_light_set", "hall"}, {"dimmer_max_weight", bad}}).import(),
                        {"node 'lamp'", "dimmer_max_weight"});
     const auto scene = levelWithLamp({{"dimmer_max_weight", 2}}).import();

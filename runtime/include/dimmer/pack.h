@@ -22,6 +22,9 @@ struct PackData;
 
 enum class ElementKind : uint32_t { LightSet = 0, Door = 1 };
 
+// No pack has a larger Element::max_weight: products of light and weights stay exact where they fit a page's format.
+inline constexpr float max_weight_limit = 1e8f;
+
 // A thing that the game controls. Light sets and doors have separate name spaces.
 struct Element {
     std::string name;
