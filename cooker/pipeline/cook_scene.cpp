@@ -152,7 +152,8 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     stats.bounces = baked.bounces;
     double energy_lm = 0;
     for (const TermReport& r : baked.reports) energy_lm += r.energy;
-    if (auto warning = allInTheDark(level.scene, energy_lm)) stats.warnings.push_back(std::move(*warning));
+    if (auto warning = allInTheDark(*level.rays, level.charts, at.texels, energy_lm))
+        stats.warnings.push_back(std::move(*warning));
     for (const std::string& w : baked.warnings) stats.warnings.push_back(level.scene.file + ": " + w);
     PackData pack;
     {

@@ -1,5 +1,8 @@
 #include <pipeline/cook_warnings.h>
 
+#include <bake/punctual.h>
+#include <bake/sampling.h>
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -49,11 +52,22 @@ std::optional<std::string> withoutLight(const Scene& scene) {
            "material that shines";
 }
 
-std::optional<std::string> allInTheDark(const Scene& scene, double energy_lm) {
+std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
+                                        double energy_lm) {
+    const Scene& scene = rays.scene();
     if (energy_lm > 0 || withoutLight(scene)) return {};
+    const auto lights = [&](const PunctualLight& light, size_t texel) {
+        const SamplePoint p = samplePoint(rays, unwrap, texels, texel, 0);
+        const Illumination lit = illuminate(light, p.position_m);
+        return luminance(lit.irradiance_lux) * glm::dot(lit.towards_light, unwrap.frames[p.face].normal) > 0 &&
+               rays.transmittance(p.position_m, lit.towards_light, shadowRayLengthM(lit), Surfaces::Walls) > 0;
+    };
+    for (const PunctualLight& light : scene.lights)
+        for (size_t i = 0; i < texels.size(); ++i)
+            if (lights(light, i)) return {};  // which renderers draw, and nothing reflects
     return scene.file +
-           ": none of its light that lightmaps store arrives at any surface, and all of it comes out black; something "
-           "may enclose the level (a dome of sky blocks the sun: 'dimmer_lighting': 'dynamic' leaves it out), or its "
+           ": none of its light arrives at any surface with a lightmap, and all of it comes out black; something may "
+           "enclose the level (a dome of sky blocks the sun: 'dimmer_lighting': 'dynamic' leaves it out), or its "
            "lights have an intensity of 0";
 }
 

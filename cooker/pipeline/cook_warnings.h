@@ -23,8 +23,9 @@ std::optional<std::string> farFromOrigin(const RayScene& rays);
 // No lamp, no sky, nothing that shines: an exporter's lights are easily left out.
 std::optional<std::string> withoutLight(const Scene& scene);
 
-// Lights there are, and none of what packs store arrives: a sky dome stops the sun, say. `energy_lm`: of all that does.
-std::optional<std::string> allInTheDark(const Scene& scene, double energy_lm);
+// Lights there are, and none of their light arrives: a sky dome stops the sun, say. `energy_lm`: of what packs store.
+std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwrap, const Texels& texels,
+                                        double energy_lm);
 
 // Most of the level is narrower than a few texels: it is in another unit, mostly.
 std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels);

@@ -65,9 +65,10 @@ class SiteLight {
 };
 
 // What placement looks at: all light together, with all doors open; then each half of the light sets (always-on light
-// with one), so that light which leaks from a set's room into a dark one is seen, with doors closed. Luminance of the radiance, nine
-// coefficients of each state. Every group counts by its own mean over those of the first block's places (all over the
-// level) that it reaches: where probes stand does not depend on how bright a set is. `order`: of the light's rows.
+// with one), so that light which leaks from a set's room into a dark one is seen, with doors closed. Luminance of the
+// radiance, nine coefficients of each state. Every group counts by its own mean over those of the first block's places
+// (all over the level) that it reaches: where probes stand does not depend on how bright a set is. `order`: of the
+// light's rows.
 inline constexpr size_t site_states = 3;
 std::vector<FitValue> statesOf(const Scene& scene, const Sparse<ProbeTermLight>& light, std::span<const Term> terms,
                                std::span<const SiteRow> order);

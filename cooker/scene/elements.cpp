@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 #include <scene/elements.h>
 
-#include <algorithm>
 #include <dimmer/pack.h>
+#include <algorithm>
 
 #include <glm/gtc/quaternion.hpp>
 

@@ -119,7 +119,7 @@ struct RayScene::Embree {
             triangle_of[solid + is_transparent].push_back(t);  // each kind's transparent one comes next
         }
         for (unsigned kind = 0; kind < kinds; ++kind) attach(kind, level);
-        // Robust: rays must not slip through the edges that closed rooms are made of.
+        // Robust: rays must not slip through the edges that closed rooms are made of. The other is for preferFront().
         rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
         rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
         rtcCommitScene(scene);

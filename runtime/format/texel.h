@@ -118,9 +118,9 @@ inline uint32_t canonicalE5B9G9R9(uint32_t code) {
 
 // Executors see only what this returns. Every code of E5B9G9R9 is a finite number.
 inline TexelRecord canonical(ColorFormat format, const TexelRecord& record) {
-    return {format == ColorFormat::E5B9G9R9 ? canonicalE5B9G9R9(record.irradiance)
-                                            : canonicalR11G11B10(record.irradiance),
-            record.direction};
+    return {
+        format == ColorFormat::E5B9G9R9 ? canonicalE5B9G9R9(record.irradiance) : canonicalR11G11B10(record.irradiance),
+        record.direction};
 }
 
 // The directional part of a texel: ambient share and the highlight's moment b (see above).

@@ -411,15 +411,32 @@ TEST(WithoutLight, IsSaidOfLevelsThatStayBlack) {
     for (const Scene& lit : {lamp, sky, panel}) EXPECT_FALSE(withoutLight(lit));
 }
 
+// A lamp over a floor, one without intensity, and a sun behind a dome.
 TEST(AllInTheDark, IsSaidWhereLightsLightNothing) {
-    Scene scene;
-    scene.file = "level.glb";
-    scene.lights.emplace_back();
-    EXPECT_FALSE(allInTheDark(scene, 1e-9));
-    ASSERT_TRUE(allInTheDark(scene, 0));
-    EXPECT_THAT(*allInTheDark(scene, 0), testing::AllOf(HasSubstr("level.glb: "), HasSubstr("black")));
-    scene.lights.clear();
-    EXPECT_FALSE(allInTheDark(scene, 0)) << "said already";
+    Scene lit;
+    lit.file = "level.glb";
+    const uint32_t grey = addMaterial(lit, lambert(0.5f));
+    addFloor(lit, 2, grey);
+    Scene enclosed = lit, black = lit;
+    addPointLight(lit, {0, 1, 0}, 10, BakeMode::Indirect);
+    addPointLight(black, {0, 1, 0}, 0, BakeMode::Full);
+    addBox(enclosed, {4, 4, 4}, grey);
+    PunctualLight& sun = addPointLight(enclosed, {0, 0, 0}, 1e5f, BakeMode::Full);
+    sun.type = LightType::Directional;
+    sun.direction = {0, -1, 0};
+    const auto warningOf = [](const Scene& scene, double energy_lm) {
+        const BakedScene b(scene, 2, 2);
+        return allInTheDark(*b.rays, b.charts, b.texels, energy_lm);
+    };
+    EXPECT_FALSE(warningOf(lit, 0));
+    EXPECT_FALSE(warningOf(black, 1e-9));
+    for (const Scene* dark : {&black, &enclosed}) {
+        const auto warning = warningOf(*dark, 0);
+        ASSERT_TRUE(warning);
+        EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("black")));
+    }
+    lit.lights.clear();
+    EXPECT_FALSE(warningOf(lit, 0)) << "said already";
 }
 
 // A room of 4 x 2.4 x 4 m in metres, decimetres and centimetres, at 4 texels per metre.
