@@ -117,9 +117,9 @@ std::vector<uint32_t> LightGrid::reachedCells(const RayScene& rays, std::span<co
         if (!(length_m > lamp_lift_m && length_m < far_m) || marks[grid_.at(point)]) continue;
         const glm::vec3 d = way / length_m;
         if (light.type == LightType::Spot && glm::dot(d, light.direction) < cos_least) continue;
-        const float as_near_as_there_m = 1e-3f + 1e-5f * length_m;
+        const float rounding_m = 1e-3f + 1e-5f * length_m;  // more than a hit is rounded by
         const float reached_m = reach(d, length_m);
-        if (reached_m + lamp_lift_m > length_m - as_near_as_there_m) mark(d, reached_m);
+        if (reached_m + lamp_lift_m > length_m - rounding_m) mark(d, reached_m);
     }
     std::vector<uint32_t> cells;
     for (uint32_t c = 0; c < marks.size(); ++c)

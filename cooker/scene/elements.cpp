@@ -1,9 +1,8 @@
+#include <dimmer/pack.h>
 #include <fmt/format.h>
 #include <scene/elements.h>
 
-#include <dimmer/pack.h>
 #include <algorithm>
-
 #include <glm/gtc/quaternion.hpp>
 
 namespace dimmer::cook {

@@ -4,6 +4,7 @@
 #include <scene/import_context.h>
 
 #include <array>
+#include <cfloat>
 #include <optional>
 #include <string>
 #include <string_view>
