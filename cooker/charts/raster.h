@@ -93,10 +93,4 @@ inline std::vector<glm::vec2> clipToCell(const std::array<glm::vec2, 3>& t, uint
     return polygon;
 }
 
-inline float polygonArea(const std::vector<glm::vec2>& polygon) {
-    float twice = 0;
-    for (size_t i = 2; i < polygon.size(); ++i) twice += cross2d(polygon[i - 1] - polygon[0], polygon[i] - polygon[0]);
-    return 0.5f * std::abs(twice);
-}
-
 }  // namespace dimmer::cook

@@ -2,6 +2,7 @@
 
 #include <bake/sampling.h>
 #include <charts/padding.h>
+#include <charts/polygon.h>
 #include <charts/raster.h>
 #include <pack/pack_data.h>
 

@@ -1,4 +1,5 @@
 // Triangles on a grid, against asking every cell.
+#include <charts/polygon.h>
 #include <charts/raster.h>
 #include <gtest/gtest.h>
 

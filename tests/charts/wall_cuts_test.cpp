@@ -106,6 +106,76 @@ TEST(WallCuts, WallsPartAFloorWhoseOutlineIsTurned) {
     expectRoomsApart(rays, *charts);
 }
 
+// A wall of one skin is a wall: a floor that runs on behind it took 97 lux of the lit room past it.
+TEST(WallCuts, SingleSkinsPartRooms) {
+    for (const float front : {1.0f, -1.0f}) {
+        SCOPED_TRACE(front);
+        Scene scene;
+        const uint32_t white = addMaterial(scene, lambert(0.5f));
+        addSolid(scene, "floor", {0, -0.1f, 0}, {4, 0.1f, 1.5f}, white);
+        addSolid(scene, "ceiling", {0, 2.8f, 0}, {4, 0.1f, 1.5f}, white);
+        addQuad(scene, "skin", {0, 1.35f, 0}, {0, 1.35f, 0}, {0, 0, front * 1.5f}, white);
+        cutAtWalls(scene, 4);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        expectRoomsApart(rays, *charts);
+    }
+}
+
+// Skins around a room that look into it, on a lawn: sun lies on the lawn up to them, and not in the room.
+TEST(WallCuts, AShellOfSkinsPartsItsRoomFromTheLawn) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "lawn", {0, 0, 0}, {0, 0, 8}, {8, 0, 0}, white);
+    for (const float side : {-1.0f, 1.0f}) {
+        addQuad(scene, "skin", {side * 2, 1.3f, 0}, {0, 1.3f, 0}, {0, 0, -side * 1.5f}, white);
+        addQuad(scene, "skin", {0, 1.3f, side * 1.5f}, {0, 1.3f, 0}, {side * 2, 0, 0}, white);
+    }
+    ASSERT_GT(scene.meshes[1].normals[0].x, 0.9f);  // of the skin at x = -2
+    cutAtWalls(scene, 4);
+    const SceneMesh& lawn = scene.meshes[0];
+    ASSERT_FALSE(lawn.triangle_regions.empty());
+    std::map<uint32_t, std::pair<bool, bool>> of;  // in the room, beside it
+    for (size_t t = 0; t < lawn.triangles.size(); ++t) {
+        glm::vec3 middle(0);
+        for (int i = 0; i < 3; ++i) middle += lawn.positions_m[lawn.triangles[t][i]] / 3.0f;
+        const bool in_room = std::abs(middle.x) < 2 && std::abs(middle.z) < 1.5f;
+        (in_room ? of[lawn.triangle_regions[t]].first : of[lawn.triangle_regions[t]].second) = true;
+    }
+    for (const auto& [region, sides] : of) EXPECT_FALSE(sides.first && sides.second) << region;
+}
+
+// Behind a skin at a floor's edge there is nothing to part from, though the floor goes on beside it.
+TEST(WallCuts, ASkinAtAFloorsEdgeCutsNothing) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "floor", {0, 0, 1}, {0, 0, 1}, {4, 0, 0}, white);
+    addQuad(scene, "floor", {-2, 0, -1}, {0, 0, 1}, {2, 0, 0}, white);
+    addQuad(scene, "skin", {0, 1.3f, -1}, {0, 1.3f, 0}, {0, 0, -1}, white);
+    cutAtWalls(scene, 4);
+    for (const SceneMesh& mesh : scene.meshes) EXPECT_EQ(mesh.triangles.size(), 2u) << mesh.node;
+}
+
+// What lacks the sides that nobody sees is no skin: there is nothing to part inside a cupboard, nor inside a step.
+TEST(WallCuts, FurnitureWithoutItsHiddenSidesCutsNothing) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "floor", {2, 0, 0}, {0, 0, 4}, {4, 0, 0}, white);
+    addQuad(scene, "wall", {-2, 1.5f, 0}, {0, 1.5f, 0}, {0, 0, 4}, white);
+    // A cupboard 1 m deep, 2 m wide and high, against the wall: no back, no bottom.
+    addQuad(scene, "front", {-1, 1, 0}, {0, 1, 0}, {0, 0, 1}, white);
+    addQuad(scene, "top", {-1.5f, 2, 0}, {0, 0, 1}, {0.5f, 0, 0}, white);
+    for (const float side : {-1.0f, 1.0f})
+        addQuad(scene, "side", {-1.5f, 1, side}, {0, 1, 0}, {-side * 0.5f, 0, 0}, white);
+    ASSERT_GT(scene.meshes[0].normals[0].y, 0.9f);
+    ASSERT_GT(scene.meshes[1].normals[0].x, 0.9f);
+    ASSERT_GT(scene.meshes[2].normals[0].x, 0.9f);
+    ASSERT_GT(scene.meshes[4].normals[0].z * scene.meshes[4].positions_m[0].z, 0.9f);
+    cutAtWalls(scene, 4);
+    for (const SceneMesh& mesh : scene.meshes) EXPECT_EQ(mesh.triangles.size(), 2u) << mesh.node;
+}
+
 // Between the jambs of a narrow doorway a leaf stands from one to the other, lower over either than a wall over a
 // floor. Not cut, the jambs carried light of the lit room past the closed leaf: up to 5 % of it.
 TEST(WallCuts, ALeafPartsTheJambsOfANarrowDoorway) {

@@ -1,0 +1,262 @@
+#include <charts/standing_walls.h>
+
+#include <charts/polygon.h>
+
+#include <glm/gtx/intersect.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+namespace dimmer::cook {
+namespace {
+
+constexpr float reach_texels = 2.5f;   // thinner than this leaks: bilinear filtering plus half a texel of averaging
+constexpr float doorway_min_m = 0.5f;  // narrower ones are gaps between a shelf's boards
+constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0.9f;
+constexpr std::array skin_shares = {0.213f, 0.531f, 0.817f};  // of a trace: where what is behind it is looked at
+constexpr float first_step_m = 1;                             // of a ray; twice as far each time
+
+float largest(glm::vec3 p) {
+    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+}
+
+// Pieces of one wall (its triangles, its faces) become one line.
+std::vector<WallLine> joined(std::vector<WallLine> lines) {
+    std::ranges::sort(lines, {}, [](const WallLine& l) { return std::tuple(l.axis, l.at, l.from, l.to); });
+    std::vector<WallLine> joined;
+    size_t first = 0;  // of those that are on the line of the ones to come
+    for (const WallLine& l : lines) {
+        while (first < joined.size() && (joined[first].axis != l.axis || !(l.at - joined[first].at < same_line_m)))
+            ++first;
+        const auto same = std::find_if(
+            joined.begin() + static_cast<std::ptrdiff_t>(first), joined.end(),
+            [&](const WallLine& o) { return l.from <= o.to + same_line_m && o.from <= l.to + same_line_m; });
+        if (same == joined.end()) {
+            joined.push_back(l);
+            continue;
+        }
+        same->from = std::min(same->from, l.from);
+        same->to = std::max(same->to, l.to);
+    }
+    return joined;
+}
+
+glm::vec2 flat(const PlanarChart& chart, glm::vec3 p) {
+    return {glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)};
+}
+
+}  // namespace
+
+float slackAt(float at) {
+    return 4 * std::numeric_limits<float>::epsilon() * std::abs(at);
+}
+
+StandingWalls::StandingWalls(std::span<const PlanarFace> faces, Blocking blocking)
+    : faces_(faces), blocking_(std::move(blocking)), level_{glm::vec3(0), glm::vec3(0)} {
+    std::vector<BoxTree::Box> boxes;
+    for (const uint32_t f : blocking_.faces) {
+        const BoxTree::Box box = BoxTree::boxOf(faces_[f].corners_m);
+        if (boxes.empty()) level_ = box;
+        level_.min_m = glm::min(level_.min_m, box.min_m), level_.max_m = glm::max(level_.max_m, box.max_m);
+        boxes.push_back(box);
+    }
+    largest_m_ = std::max(largest(level_.min_m), largest(level_.max_m));
+    boxes_ = BoxTree(std::move(boxes));
+}
+
+std::vector<WallLine> StandingWalls::on(const PlanarChart& chart) const {
+    const float reach_m = reach_texels / chart.texels_per_metre;
+    const std::vector<Trace> traces =
+        standing(findTraces(chart, wall_probe_low_m), findTraces(chart, highProbe(chart)));
+    std::vector<WallLine> lines;
+    for (const Trace& a : traces) {
+        if (isSkin(chart, a)) lines.push_back(a);
+        if (a.forward) continue;
+        // A solid between a's front, looking back, and b's, looking forward.
+        for (const Trace& b : near(traces, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
+            if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
+            const float from = std::max(a.from, b.from), to = std::min(a.to, b.to);
+            if (to - from > same_line_m) lines.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
+        }
+    }
+    return joined(std::move(lines));
+}
+
+// A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
+// other, and is no higher over either. So below what faces nearly all of the chart, where that is near.
+float StandingWalls::highProbe(const PlanarChart& chart) const {
+    const PlanarFace& any = faces_[chart.faces[0]];
+    if (any.group != 0) return wall_probe_high_m;  // of a door's leaf
+    const float plane = glm::dot(any.normal, any.corners_m[0]);
+    const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
+    BoxTree::Box box = boxOver(chart, 0);
+    const BoxTree::Box above = boxOver(chart, wall_probe_high_m);
+    box.min_m = glm::min(box.min_m, above.min_m), box.max_m = glm::max(box.max_m, above.max_m);
+    std::vector<std::pair<float, float>> facing;  // height, area over the chart's rectangle
+    for (const uint32_t near : boxes_.touching(box)) {
+        const PlanarFace& face = faces_[blocking_.faces[near]];
+        const float height = glm::dot(any.normal, face.corners_m[0]) - plane;
+        const bool moves = face.group != 0;
+        if (moves || glm::dot(any.normal, face.normal) > -facing_cos || height < doorway_min_m ||
+            height > wall_probe_high_m)
+            continue;
+        Polygon over;
+        for (const glm::vec3 p : face.corners_m) over.push_back(flat(chart, p));
+        for (int axis = 0; axis < 2; ++axis) over = clipped(clipped(over, axis, low[axis], 1), axis, high[axis], -1);
+        facing.emplace_back(height, polygonArea(over));
+    }
+    std::ranges::sort(facing);
+    float covered = 0;
+    for (const auto& [height, area_m2] : facing)
+        if ((covered += area_m2) >= facing_share * chart.size_m.x * chart.size_m.y) return probe_share_of_room * height;
+    return wall_probe_high_m;
+}
+
+auto StandingWalls::placeOf(const Trace& trace) {
+    return std::tuple(trace.axis, trace.forward, trace.at);
+}
+
+// Of traces in the order of placeOf, those between two places and perhaps a few more.
+std::span<const StandingWalls::Trace> StandingWalls::near(std::span<const Trace> sorted, int axis, bool forward,
+                                                          float low, float high) {
+    const auto first = std::ranges::lower_bound(sorted, std::tuple(axis, forward, low - slackAt(low)), {}, placeOf);
+    return {first, std::ranges::upper_bound(first, sorted.end(), std::tuple(axis, forward, high + slackAt(high)), {},
+                                            placeOf)};
+}
+
+// What is there at both heights.
+std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trace>& low, std::vector<Trace> high) {
+    std::ranges::sort(high, {}, placeOf);
+    std::vector<Trace> both;
+    for (const Trace& a : low)
+        for (const Trace& b : near(high, a.axis, a.forward, a.at - same_line_m, a.at + same_line_m)) {
+            if (std::abs(a.at - b.at) > same_line_m) continue;
+            Trace trace = a;
+            trace.from = std::max(a.from, b.from), trace.to = std::min(a.to, b.to);
+            if (trace.to - trace.from > same_line_m) both.push_back(trace);
+        }
+    std::ranges::sort(both, {}, placeOf);
+    return both;
+}
+
+// A place at a height over a chart. The normal of one of its faces may differ from the chart's own by a rounding step.
+glm::vec3 StandingWalls::onPlane(const PlanarChart& chart, glm::vec2 at, float height_m) const {
+    const PlanarFace& any = faces_[chart.faces[0]];
+    const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
+    const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis);
+    const glm::vec3 p = at.x * chart.u_axis + at.y * chart.v_axis;
+    return p + up * ((height - glm::dot(any.normal, p)) / glm::dot(any.normal, up));
+}
+
+// What holds every trace that counts at a height over a chart's rectangle.
+BoxTree::Box StandingWalls::boxOver(const PlanarChart& chart, float height_m) const {
+    std::array<glm::vec3, 4> corners;
+    for (uint32_t i = 0; i < 4; ++i)
+        corners[i] = onPlane(chart, chart.min_m + chart.size_m * glm::vec2(i & 1, i >> 1), height_m);
+    BoxTree::Box box = BoxTree::boxOf(corners);
+    const float reach_m =
+        wall_margin_m + same_line_m + rounding_share * std::max({largest_m_, largest(box.min_m), largest(box.max_m)});
+    box.min_m -= reach_m;
+    box.max_m += reach_m;
+    return box;
+}
+
+std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m) const {
+    const PlanarFace& any = faces_[chart.faces[0]];
+    const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
+    const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
+    std::vector<Trace> traces;
+    for (const uint32_t near : boxes_.touching(boxOver(chart, height_m))) {
+        const PlanarFace& face = faces_[blocking_.faces[near]];
+        std::array<float, 3> d;
+        for (size_t i = 0; i < 3; ++i) d[i] = glm::dot(any.normal, face.corners_m[i]) - height;
+        std::array<glm::vec2, 2> ends;
+        size_t n = 0;
+        for (size_t i = 0; i < 3 && n < 2; ++i) {
+            const size_t j = (i + 1) % 3;
+            if ((d[i] > 0) == (d[j] > 0)) continue;
+            ends[n++] = flat(chart, glm::mix(face.corners_m[i], face.corners_m[j], d[i] / (d[i] - d[j])));
+        }
+        if (n < 2) continue;
+        const glm::vec2 normal = flat(chart, face.normal);
+        const bool double_sided = blocking_.double_sided[near];
+        for (int axis = 0; axis < 2; ++axis) {
+            const auto& [a, b] = ends;
+            if (std::abs(a[axis] - b[axis]) > same_line_m) continue;
+            const int along = 1 - axis;
+            const float at = 0.5f * (a[axis] + b[axis]), from = std::max(low[along], std::min(a[along], b[along])),
+                        to = std::min(high[along], std::max(a[along], b[along]));
+            if (to - from < same_line_m || at < low[axis] - wall_margin_m || at > high[axis] + wall_margin_m) continue;
+            const bool forward = normal[axis] > 0;
+            traces.push_back({{axis, at, from, to}, forward, double_sided});
+            if (double_sided) traces.push_back({{axis, at, from, to}, !forward, double_sided});
+        }
+    }
+    return traces;
+}
+
+// A face of no solid: the chart goes on behind it, and backs are seen there neither along the plane nor straight up.
+// (They are within solids, and within what lacks the sides that touch others: cupboards, steps.)
+bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
+    if (trace.double_sided) return false;
+    const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
+                    behind = (trace.forward ? -1.0f : 1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
+    return std::ranges::any_of(skin_shares, [&](float share) {
+        const float at = glm::mix(trace.from, trace.to, share);
+        const glm::vec3 on_line =
+            onPlane(chart, trace.axis == 0 ? glm::vec2(trace.at, at) : glm::vec2(at, trace.at), 0);
+        const glm::vec3 beside = 2 * wall_margin_m * behind;
+        if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) return false;
+        const glm::vec3 from = on_line + beside + wall_probe_low_m * up;
+        return std::ranges::none_of(std::array{behind, along, -along, up},
+                                    [&](glm::vec3 d) { return seesBack(from, d); });
+    });
+}
+
+bool StandingWalls::covers(const PlanarChart& chart, glm::vec3 p) const {
+    const glm::vec2 at = flat(chart, p);
+    return std::ranges::any_of(boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t near) {
+        const uint32_t face = blocking_.faces[near];
+        if (!std::ranges::binary_search(chart.faces, face)) return false;
+        std::array<float, 3> side;
+        for (size_t i = 0; i < 3; ++i) {
+            const glm::vec2 a = flat(chart, faces_[face].corners_m[i]),
+                            b = flat(chart, faces_[face].corners_m[(i + 1) % 3]);
+            side[i] = (b.x - a.x) * (at.y - a.y) - (b.y - a.y) * (at.x - a.x);
+        }
+        return std::ranges::min(side) >= 0;
+    });
+}
+
+// Whether the first thing that a ray meets is the back of a face. Where a face and a back touch it is the face that
+// counts, as for rays of light.
+bool StandingWalls::seesBack(glm::vec3 from, glm::vec3 direction) const {
+    float end_m = 0;  // of the level
+    for (uint32_t i = 0; i < 8; ++i) {
+        const glm::vec3 corner = glm::mix(level_.min_m, level_.max_m, glm::vec3(i & 1, i >> 1 & 1, i >> 2));
+        end_m = std::max(end_m, glm::dot(corner - from, direction));
+    }
+    constexpr float none = std::numeric_limits<float>::max();
+    float face_m = none, back_m = none;
+    for (float step_m = first_step_m; std::min(face_m, back_m) == none && step_m < 2 * end_m; step_m *= 2) {
+        BoxTree::Box box = BoxTree::boxOf(std::array{from, from + std::min(step_m, end_m) * direction});
+        box.min_m -= same_line_m, box.max_m += same_line_m;
+        for (const uint32_t near : boxes_.touching(box)) {
+            const PlanarFace& face = faces_[blocking_.faces[near]];
+            glm::vec2 weights;
+            float away_m = 0;
+            const auto& [a, b, c] = face.corners_m;
+            if (!glm::intersectRayTriangle(from, direction, a, b, c, weights, away_m)) continue;
+            if (away_m < 0 || away_m > step_m) continue;
+            const bool is_back = glm::dot(face.normal, direction) > 0 && !blocking_.double_sided[near];
+            float& nearest_m = is_back ? back_m : face_m;
+            nearest_m = std::min(nearest_m, away_m);
+        }
+    }
+    return back_m < face_m - same_line_m;
+}
+
+}  // namespace dimmer::cook

@@ -1,0 +1,70 @@
+// Finds the thin walls that stand on charts.
+#pragma once
+
+#include <charts/box_tree.h>
+#include <charts/planar.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace dimmer::cook {
+
+// Where a wall stands on a chart: a stretch of the line x = at (axis 0) or y = at (axis 1), in metres along its axes.
+struct WallLine {
+    int axis = 0;
+    float at = 0, from = 0, to = 0;
+};
+
+inline constexpr float same_line_m = 2e-3f;     // what lies closer is one line
+inline constexpr float wall_margin_m = 5e-3f;   // a wall this close to a rectangle's edge parts nothing
+inline constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
+
+// What sums with a coordinate lose to rounding, and more.
+float slackAt(float at);
+
+// What light does not pass, indices of faces, and whether they block with both sides.
+struct Blocking {
+    std::vector<uint32_t> faces;  // ascending
+    std::vector<bool> double_sided;
+};
+
+// Immutable after construction; queries are thread-safe.
+class StandingWalls {
+   public:
+    StandingWalls() = default;
+    // `faces` must outlive this.
+    StandingWalls(std::span<const PlanarFace> faces, Blocking blocking);
+
+    // The middles of solids that are thinner than a filtered texel reaches, and single skins with open air behind them,
+    // over which the chart goes on. Each stands on the chart at wall_probe_low_m, and at wall_probe_high_m or as high
+    // as there is room. In the order of axis and place. Cost: that of the faces at the two heights over the chart, and
+    // of up to three rays behind each single-sided one of them.
+    std::vector<WallLine> on(const PlanarChart& chart) const;
+
+   private:
+    // The trace of a blocking triangle on a plane.
+    struct Trace : WallLine {
+        bool forward = false;       // its front looks towards larger coordinates
+        bool double_sided = false;  // of the triangle, which leaves a trace of either direction
+    };
+
+    static auto placeOf(const Trace& trace);
+    static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high);
+    static std::vector<Trace> standing(const std::vector<Trace>& low, std::vector<Trace> high);
+    std::vector<Trace> findTraces(const PlanarChart& chart, float height_m) const;
+    float highProbe(const PlanarChart& chart) const;
+    glm::vec3 onPlane(const PlanarChart& chart, glm::vec2 at, float height_m) const;
+    BoxTree::Box boxOver(const PlanarChart& chart, float height_m) const;
+    bool isSkin(const PlanarChart& chart, const Trace& trace) const;
+    bool covers(const PlanarChart& chart, glm::vec3 p) const;
+    bool seesBack(glm::vec3 from, glm::vec3 direction) const;
+
+    std::span<const PlanarFace> faces_;
+    Blocking blocking_;
+    BoxTree boxes_;        // of blocking_.faces
+    BoxTree::Box level_;   // that holds them all
+    float largest_m_ = 0;  // coordinate among theirs
+};
+
+}  // namespace dimmer::cook
