@@ -11,7 +11,7 @@
 namespace dimmer::cook {
 
 // Nearer than this a lamp shines as from there: it is no point.
-inline constexpr float lamp_distance_min_m = 0.01f;
+inline constexpr float lamp_distance_min_m = 1e-3f;
 
 struct Illumination {
     glm::vec3 towards_light{0};   // unit
@@ -27,7 +27,7 @@ inline float shadowRayLengthM(const Illumination& lit) {
     return std::isinf(lit.distance_m) ? far_away_m : std::max(0.0f, lit.distance_m - lamp_lift_m);
 }
 
-// What `light` does at `point`. Inverse square with a least distance of 1 cm, windowed by the range; spots by the glTF
+// What `light` does at `point`. Inverse square with a least distance of 1 mm, windowed by the range; spots by the glTF
 // cone formula (KHR_lights_punctual); measured luminaires by their profile (EXT_lights_ies).
 Illumination illuminate(const PunctualLight& light, glm::vec3 point);
 

@@ -97,7 +97,7 @@ TEST(NearLamps, MayBeMillimetresOverAPoint) {
     Scene scene;
     addFloor(scene, 1, addMaterial(scene, lambert(0)));
     const glm::vec3 point = BakedScene(scene).position(27, 2);
-    for (const float height : {0.001f, 0.002f, 0.005f, 0.02f}) {
+    for (const float height : {0.0006f, 0.002f, 0.005f, 0.02f}) {
         scene.lights.clear();
         addPointLight(scene, {point.x, height, point.z}, lamp_cd, BakeMode::Full);
         BakedScene b(scene);

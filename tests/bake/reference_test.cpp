@@ -37,6 +37,28 @@ TEST(Reference, PointLightOverAPlaneFollowsTheInverseSquare) {
     EXPECT_EQ(trace(scene, {0, 0, 0}, up, 16).irradiance_lux, glm::vec3(0));
 }
 
+// A lamp millimetres over a floor lays half of its light on it: what comes back is that of one at a few centimetres.
+TEST(Reference, ALampCloseToAFloorLosesNothing) {
+    for (const double lamp_m : {0.002, 0.005, 0.05}) {
+        SCOPED_TRACE(lamp_m);
+        constexpr double eye_m = 2, rho = 0.5, candela = 100;
+        Scene scene;
+        addFloor(scene, 20, addMaterial(scene, lambert(static_cast<float>(rho))));
+        addPointLight(scene, {0, static_cast<float>(lamp_m), 0}, static_cast<float>(candela), BakeMode::Indirect);
+        // Over rings of the floor, of r = lamp_m tan(a): rho / pi of the lamp's light there, times the ring's form
+        // factor from the eye above it.
+        double expected = 0;
+        constexpr int steps = 4096;
+        for (int i = 0; i < steps; ++i) {
+            const double angle = (i + 0.5) / steps * pi_d / 2, r = lamp_m * std::tan(angle);
+            const double arrives_cd = candela * std::sin(angle);  // over 2 pi d(angle)
+            const double seen = eye_m * eye_m / std::pow(r * r + eye_m * eye_m, 2);
+            expected += rho / pi_d * arrives_cd * seen * 2 * pi_d * (pi_d / 2 / steps);
+        }
+        expectLux(trace(scene, {0, static_cast<float>(eye_m), 0}, -up, 100000), expected, 0.03);
+    }
+}
+
 TEST(Reference, Furnace) {
     for (float rho : {0.5f, 0.8f}) {
         Scene scene;
