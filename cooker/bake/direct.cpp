@@ -1,6 +1,7 @@
 #include <bake/direct.h>
 
 #include <bake/door_rays.h>
+#include <bake/narrow_beams.h>
 #include <bake/near_lamps.h>
 #include <bake/punctual.h>
 #include <bake/sampling.h>
@@ -24,22 +25,27 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
     const DoorPaths& paths = gatherer.paths();
     const auto points = static_cast<uint32_t>(from.points.size());
     uint64_t traced = 0;
-    const auto addLight = [&](const PunctualLight& light, const SamplePoint& p, float share) {
-        const Illumination lit = illuminate(light, p.position_m);
-        const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
-        const float weight = Light::Intake::weight(direction);
-        if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) return;
+    // `lit`: at the point; `arrives_lux`: on its surface, if nothing is between.
+    const auto addArriving = [&](const PunctualLight& light, const SamplePoint& p, const Illumination& lit,
+                                 glm::vec3 direction, glm::vec3 arrives_lux) {
         ++traced;
         const float distance_m = shadowRayLengthM(lit);
         forEachWay(rays, paths, from.condition, from.ignored, p.position_m, lit.towards_light, distance_m,
                    [&](float passed, uint32_t path) {
                        const uint32_t term = paths.term(groupOf(light.light_set), path);
                        if (term == no_term) return;
-                       const glm::vec3 lux = lit.irradiance_lux * (weight * passed * share);
+                       const glm::vec3 lux = arrives_lux * passed;
                        const auto weights = Light::weightsOf(direction);
                        reflected[term].add(lux, weights);
                        if (light.bake == BakeMode::Full) stored[term].add(lux, weights);
                    });
+    };
+    const auto addLight = [&](const PunctualLight& light, const SamplePoint& p, float share) {
+        const Illumination lit = illuminate(light, p.position_m);
+        const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
+        const float weight = Light::Intake::weight(direction);
+        if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) return;
+        addArriving(light, p, lit, direction, lit.irradiance_lux * (weight * share));
     };
     const std::vector<PunctualLight>& lights = rays.scene().lights;
     const auto scaleOf = [&](const PunctualLight& light) {
@@ -54,6 +60,13 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
     const glm::vec3 place = from.points[0].position_m;
     grid.forEach(place, [&](uint32_t l) {
         const PunctualLight& light = lights[l];
+        if (const auto beam = narrowBeam(gatherer, from, light)) {
+            for (const auto& [p, lux] : *beam) {
+                const Illumination lit = illuminate(light, p.position_m);
+                addArriving(light, p, lit, gatherer.toTangent(p, lit.towards_light), lux);
+            }
+            return;
+        }
         const float scale = scaleOf(light);
         const uint32_t first = hash(grid.identity(l), from.id) % points;
         // Shadows that are stored are seen, and have edges at any distance.

@@ -61,7 +61,6 @@ void warnOfPlaces(const Receivers& at, CookStats& stats) {
     if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
     if (auto warning = tooSmallForTexels(level.scene, level.charts, at.texels))
         stats.warnings.push_back(std::move(*warning));
-    std::ranges::move(narrowSpots(*level.rays, level.charts), std::back_inserter(stats.warnings));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));

@@ -87,26 +87,6 @@ std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& u
         scene.file, few_texels);
 }
 
-std::vector<std::string> narrowSpots(const RayScene& rays, const Unwrap& unwrap) {
-    constexpr float texels_min = 2;
-    std::vector<std::string> warnings;
-    for (const PunctualLight& light : rays.scene().lights) {
-        if (light.type != LightType::Spot || light.bake == BakeMode::None) continue;
-        const auto hit = rays.nearest(light.position_m, light.direction, far_away_m, 0, Surfaces::Walls);
-        const uint32_t face = hit ? unwrap.faceOf(hit->triangle, hit->back) : no_index;
-        if (face == no_index) continue;
-        const float tan = std::sqrt(1 - light.cone_outer_cos * light.cone_outer_cos) / light.cone_outer_cos;
-        const float across_m = 2 * hit->distance_m * tan, texel_m = std::sqrt(unwrap.texel_area_m2[face]);
-        if (!(light.cone_outer_cos > 0 && across_m < texels_min * texel_m)) continue;
-        warnings.push_back(fmt::format(
-            "{}: node '{}': its beam is {:.3g} m across where it meets a surface of {:.3g} m per texel: what "
-            "it sends back may be far off; widen it, or take more texels per metre there "
-            "(dimmer_texel_density)",
-            rays.scene().file, light.node, across_m, texel_m));
-    }
-    return warnings;
-}
-
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {
     std::vector<std::string> warnings;
     for (const auto& [key, origin] : profile.origin)

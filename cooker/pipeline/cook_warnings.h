@@ -30,9 +30,6 @@ std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwr
 // Most of the level is narrower than a few texels: it is in another unit, mostly.
 std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels);
 
-// Spots whose light meets a surface in a patch so narrow that texels' points are too few for it.
-std::vector<std::string> narrowSpots(const RayScene& rays, const Unwrap& unwrap);
-
 // Of the command line's settings for another quality, which do nothing.
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);
 

@@ -453,24 +453,6 @@ TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
     }
 }
 
-// 2.6 m over a floor of 25 cm a texel: beams of 2.6, 0.52 and 0.1 m across.
-TEST(NarrowSpots, AreThoseThatMeetHardlyATexel) {
-    Scene scene;
-    scene.file = "level.glb";
-    addFloor(scene, 4, addMaterial(scene, lambert(0.5f)));
-    for (const float tan : {0.5f, 0.1f, 0.02f}) {
-        PunctualLight& spot = addPointLight(scene, {0, 2.6f, 0}, 100, BakeMode::Indirect);
-        spot.node = fmt::format("beam {}", tan);
-        spot.type = LightType::Spot;
-        spot.direction = {0, -1, 0};
-        spot.cone_outer_cos = 1 / std::sqrt(1 + tan * tan);
-    }
-    const BakedScene b(scene, 4, 4);
-    const auto warnings = narrowSpots(*b.rays, b.charts);
-    ASSERT_EQ(warnings.size(), 1u);
-    EXPECT_THAT(warnings[0], testing::AllOf(HasSubstr("node 'beam 0.02'"), HasSubstr("0.104 m across")));
-}
-
 TEST(FarFromOrigin, IsSaidOfLevelsFarOff) {
     for (const float at_m : {0.0f, 1500.0f, -5000.0f}) {
         Scene scene;
