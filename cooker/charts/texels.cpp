@@ -22,6 +22,9 @@ constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
+// There is air where ten of the rays along a surface, nearly, get so far without meeting a back.
+constexpr uint32_t horizon_rays = 16, horizon_open_min = 10;
+constexpr float horizon_sine = 0.1f, horizon_open_m = 1;
 // A texel whose first points all lie inside geometry is given up.
 constexpr uint32_t drops_max = 24;
 constexpr float steps_per_texel = TexelPoint::steps;
@@ -62,7 +65,9 @@ std::vector<glm::u16vec2> centredHalton(uint32_t count) {
     std::vector<glm::u16vec2> steps;
     for (const glm::vec2 p : points) {
         const glm::vec2 within = glm::fract(p + 0.5f - sum / static_cast<float>(count));
-        steps.emplace_back(glm::min(glm::round(within * steps_per_texel), steps_per_texel - 1));
+        // None on the texel's edge: where a wall's skin cuts a chart the edge is in the skin, of neither side.
+        constexpr float off_edge = steps_per_texel / 256;
+        steps.emplace_back(glm::clamp(glm::round(within * steps_per_texel), off_edge, steps_per_texel - off_edge));
     }
     return steps;
 }
@@ -207,7 +212,21 @@ class TexelSampler {
             const auto hit = nearest(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
             backs += hit && hit->back && !doubleSided(hit->triangle);
         }
-        return 2 * backs > inside_test_rays;
+        return 2 * backs > inside_test_rays && !openAround(f, nearest);
+    }
+
+    // Below a roof of one skin backs are most of what is seen, and air is all around. (Inside a cupboard without its
+    // hidden sides the wall behind it is near.)
+    bool openAround(const TangentFrame& f, auto&& nearest) const {
+        uint32_t open = 0;
+        for (uint32_t i = 0; i < horizon_rays && open < horizon_open_min; ++i) {
+            const float angle = 2 * pi * static_cast<float>(i) / horizon_rays;
+            const glm::vec3 along = std::cos(angle) * f.tangent + std::sin(angle) * f.bitangent;
+            const auto hit = nearest(std::sqrt(1 - horizon_sine * horizon_sine) * along + horizon_sine * f.normal);
+            const bool stopped_by_back = hit && hit->back && !doubleSided(hit->triangle);
+            open += !stopped_by_back && !(hit && hit->distance_m < horizon_open_m);
+        }
+        return open >= horizon_open_min;
     }
 
     bool doubleSided(uint32_t triangle) const {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <ranges>
 
 namespace dimmer::cook::test {
 namespace {
@@ -46,6 +47,73 @@ TEST(Texels, PointsBalanceAroundTheCentre) {
             EXPECT_NEAR(sum.y / count, centre.y, 1e-4) << count;
         }
         EXPECT_GT(whole, 200u);
+    }
+}
+
+// Where a wall's skin cuts a chart, the texel's edge lies in the skin: a point there is of either side.
+TEST(Texels, PointsLieOffTheEdge) {
+    Scene scene;
+    addFloor(scene, 2, addMaterial(scene, lambert(0.5f)));
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+    ASSERT_TRUE(charts.has_value());
+    for (const uint32_t count : {1u, 4u, 5u, 6u, 8u, 64u}) {
+        const Texels texels = sampleTexels(rays, *charts, count);
+        for (const TexelPoint& p : texels.samples) {
+            const auto least = static_cast<uint32_t>(std::min(p.x, p.y)), most = uint32_t{std::max(p.x, p.y)};
+            ASSERT_GE(least, TexelPoint::steps / 256) << count;
+            ASSERT_LE(most, TexelPoint::steps - TexelPoint::steps / 256) << count;
+        }
+    }
+}
+
+// Receivers among a mesh's texels, by whether a point is in a part of the plane.
+size_t receiversWhere(const RayScene& rays, const Unwrap& charts, const Texels& texels, const char* mesh, auto&& in) {
+    return static_cast<size_t>(std::ranges::count_if(std::views::iota(size_t{0}, texels.size()), [&](size_t i) {
+        const uint32_t triangle = charts.faces[texels.face(i)].triangle;
+        return rays.scene().meshes[rays.triangles()[triangle].mesh].node == mesh &&
+               in(samplePoint(rays, charts, texels, i, 0).position_m);
+    }));
+}
+
+// Backs are most of what is seen below a roof that has one side, which looks up. It is no solid's inside.
+TEST(Texels, OfAHallBelowABackAreLit) {
+    for (const bool walls : {false, true}) {
+        Scene scene;
+        const uint32_t grey = addMaterial(scene, lambert(0.5f));
+        addFloor(scene, 5, grey);
+        addFloor(scene, 5, grey, 3).node = "roof";
+        if (walls)
+            for (const float side : {-1.0f, 1.0f}) {
+                addQuad(scene, "wall", {side * 5, 1.5f, 0}, {0, 1.5f, 0}, {0, 0, -side * 5}, grey);
+                addQuad(scene, "wall", {0, 1.5f, side * 5}, {0, 1.5f, 0}, {side * 5, 0, 0}, grey);
+            }
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 4);
+        EXPECT_GE(receiversWhere(rays, *charts, texels, "floor", [](glm::vec3) { return true; }), 40u * 40u) << walls;
+    }
+}
+
+// What furniture hides gets no light, with or without its hidden sides, and is no receiver, a texel away from these.
+TEST(Texels, OfAFloorBelowFurnitureAreNone) {
+    for (const bool closed : {false, true}) {
+        Scene scene;
+        const uint32_t grey = addMaterial(scene, lambert(0.5f));
+        addQuad(scene, "floor", {2, 0, 0}, {0, 0, 4}, {4, 0, 0}, grey);
+        addQuad(scene, "wall", {-2, 1.5f, 0}, {0, 1.5f, 0}, {0, 0, 4}, grey);
+        addSolid(scene, "cupboard", {-1.5f, 1, 0}, {0.5f, 1, 1}, grey);
+        if (!closed)
+            std::erase_if(scene.meshes, [](const SceneMesh& m) {
+                return m.node == "cupboard" && (m.normals[0].y < -0.5f || m.normals[0].x < -0.5f);
+            });
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 4);
+        const auto within = [](glm::vec3 p) { return std::abs(p.x + 1.5f) < 0.25f && std::abs(p.z) < 0.75f; };
+        EXPECT_EQ(receiversWhere(rays, *charts, texels, "floor", within), 0u) << closed;
     }
 }
 
