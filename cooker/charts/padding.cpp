@@ -95,10 +95,12 @@ class Padding {
             return no_index;
         const uint32_t found = receiverOf(unwrap_, texels_, *hit);
         if (found == no_index || found == fill.source) return no_index;
-        const glm::vec3 lift = frame.normal * wall_probe_low_m;
-        const glm::vec3 from = own.position_m + lift,
-                        to = samplePoint(rays_, unwrap_, texels_, found, 0).position_m + lift;
-        return rays_.blocked(from, to) || rays_.blocked(to, from) ? no_index : found;
+        const glm::vec3 from = own.position_m, to = samplePoint(rays_, unwrap_, texels_, found, 0).position_m;
+        for (const float height_m : {wall_probe_low_m, leaf_probe_low_m}) {
+            const glm::vec3 lift = frame.normal * height_m;
+            if (rays_.blocked(from + lift, to + lift) || rays_.blocked(to + lift, from + lift)) return no_index;
+        }
+        return found;
     }
 
     // The plane of a face, continued to any place of the page.

@@ -12,9 +12,9 @@
 namespace dimmer::cook {
 
 // What parts two places of a plane is looked for at these heights above it: a wall stands at both, furniture against a
-// wall, a skirting board or a window's frame do not reach the second. (Walls that are cut at stand lower where there is
-// less room: wall_cuts.cpp.)
-inline constexpr float wall_probe_low_m = 0.01f, wall_probe_high_m = 0.8f;
+// wall, a skirting board or a window's frame do not reach the second. Doors' leaves hang a little above the floor.
+// (Walls that are cut at stand lower where there is less room: standing_walls.cpp.)
+inline constexpr float wall_probe_low_m = 0.01f, leaf_probe_low_m = 0.05f, wall_probe_high_m = 0.8f;
 
 struct PlanarFace {
     std::array<glm::vec3, 3> corners_m;  // counter-clockwise seen from the lit side

@@ -16,8 +16,14 @@ namespace {
 constexpr float reach_texels = 2.5f;   // thinner than this leaks: bilinear filtering plus half a texel of averaging
 constexpr float doorway_min_m = 0.5f;  // narrower ones are gaps between a shelf's boards
 constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0.9f;
-constexpr std::array skin_shares = {0.213f, 0.531f, 0.817f};  // of a trace: where what is behind it is looked at
-constexpr float first_step_m = 1;                             // of a ray; twice as far each time
+constexpr float lean_max = 0.5f;  // what leans more is a roof
+// A trace need not be quite straight along the axis, over so much of its length and of a texel.
+constexpr float skew_share = 0.02f, skew_texels = 0.25f, skew_max_m = 0.1f;
+constexpr float same_slope = 1e-3f;
+constexpr float skins_per_m = 1;  // places at which is looked what is behind a skin, within limits
+constexpr int skins_min = 3, skins_max = 16;
+constexpr float thick_m = 1;       // of solids: farther behind a face, a back is another wall's
+constexpr float first_step_m = 1;  // of a ray; twice as far each time
 
 float largest(glm::vec3 p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -65,12 +71,15 @@ StandingWalls::StandingWalls(std::span<const PlanarFace> faces, Blocking blockin
     }
     largest_m_ = std::max(largest(level_.min_m), largest(level_.max_m));
     boxes_ = BoxTree(std::move(boxes));
+    boxes.clear();
+    for (const PlanarFace& face : faces_) boxes.push_back(BoxTree::boxOf(face.corners_m));
+    all_boxes_ = BoxTree(std::move(boxes));
 }
 
 std::vector<WallLine> StandingWalls::on(const PlanarChart& chart) const {
     const float reach_m = reach_texels / chart.texels_per_metre;
     const std::vector<Trace> traces =
-        standing(findTraces(chart, wall_probe_low_m), findTraces(chart, highProbe(chart)));
+        standing(lowTraces(chart), joinedTraces(findTraces(chart, highProbe(chart), Which::All)));
     std::vector<WallLine> lines;
     for (const Trace& a : traces) {
         if (isSkin(chart, a)) lines.push_back(a);
@@ -127,17 +136,21 @@ std::span<const StandingWalls::Trace> StandingWalls::near(std::span<const Trace>
                                             placeOf)};
 }
 
-// What is there at both heights.
+// What is there at both heights, in one plane.
 std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trace>& low, std::vector<Trace> high) {
     std::ranges::sort(high, {}, placeOf);
     std::vector<Trace> both;
-    for (const Trace& a : low)
-        for (const Trace& b : near(high, a.axis, a.forward, a.at - same_line_m, a.at + same_line_m)) {
-            if (std::abs(a.at - b.at) > same_line_m) continue;
+    for (const Trace& a : low) {
+        const float leans_m = high.empty() ? 0 : a.lean * (high[0].height_m - a.height_m);
+        const float at = a.at + leans_m, reach_m = same_line_m + skew_max_m;
+        for (const Trace& b : near(high, a.axis, a.forward, at - reach_m, at + reach_m)) {
             Trace trace = a;
             trace.from = std::max(a.from, b.from), trace.to = std::min(a.to, b.to);
-            if (trace.to - trace.from > same_line_m) both.push_back(trace);
+            if (!(trace.to - trace.from > same_line_m)) continue;
+            const float middle = 0.5f * (trace.from + trace.to);
+            if (std::abs(a.atAlong(middle) + leans_m - b.atAlong(middle)) <= same_line_m) both.push_back(trace);
         }
+    }
     std::ranges::sort(both, {}, placeOf);
     return both;
 }
@@ -164,13 +177,15 @@ BoxTree::Box StandingWalls::boxOver(const PlanarChart& chart, float height_m) co
     return box;
 }
 
-std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m) const {
+std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m,
+                                                            Which which) const {
     const PlanarFace& any = faces_[chart.faces[0]];
     const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
     const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
     std::vector<Trace> traces;
     for (const uint32_t near : boxes_.touching(boxOver(chart, height_m))) {
         const PlanarFace& face = faces_[blocking_.faces[near]];
+        if (which != Which::All && (face.group != 0) != (which == Which::Leaves)) continue;
         std::array<float, 3> d;
         for (size_t i = 0; i < 3; ++i) d[i] = glm::dot(any.normal, face.corners_m[i]) - height;
         std::array<glm::vec2, 2> ends;
@@ -185,41 +200,81 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& c
         const bool double_sided = blocking_.double_sided[near];
         for (int axis = 0; axis < 2; ++axis) {
             const auto& [a, b] = ends;
-            if (std::abs(a[axis] - b[axis]) > same_line_m) continue;
             const int along = 1 - axis;
+            const float length_m = std::abs(a[along] - b[along]);
+            const float skew_m = std::min({skew_share * length_m, skew_texels / chart.texels_per_metre, skew_max_m});
+            if (std::abs(a[axis] - b[axis]) > std::max(same_line_m, skew_m)) continue;
+            const float lean = -glm::dot(any.normal, face.normal) / normal[axis];
+            if (!(std::abs(lean) < lean_max)) continue;
             const float at = 0.5f * (a[axis] + b[axis]), from = std::max(low[along], std::min(a[along], b[along])),
                         to = std::min(high[along], std::max(a[along], b[along]));
             if (to - from < same_line_m || at < low[axis] - wall_margin_m || at > high[axis] + wall_margin_m) continue;
             const bool forward = normal[axis] > 0;
-            traces.push_back({{axis, at, from, to}, forward, double_sided});
-            if (double_sided) traces.push_back({{axis, at, from, to}, !forward, double_sided});
+            Trace trace{{axis, at, from, to}, forward, double_sided, lean};
+            trace.skew = length_m > same_line_m ? (b[axis] - a[axis]) / (b[along] - a[along]) : 0;
+            trace.middle = 0.5f * (a[along] + b[along]);
+            trace.height_m = height_m;
+            traces.push_back(trace);
+            trace.forward = !forward;
+            if (double_sided) traces.push_back(trace);
         }
     }
     return traces;
 }
 
-// A face of no solid: the chart goes on behind it, and backs are seen there neither along the plane nor straight up.
-// (They are within solids, and within what lacks the sides that touch others: cupboards, steps.)
+// Of leaves over what does not move a little higher up.
+std::vector<StandingWalls::Trace> StandingWalls::lowTraces(const PlanarChart& chart) const {
+    if (faces_[chart.faces[0]].group != 0) return joinedTraces(findTraces(chart, wall_probe_low_m, Which::All));
+    std::vector<Trace> traces = findTraces(chart, wall_probe_low_m, Which::Fixed);
+    const std::vector<Trace> leaves = findTraces(chart, leaf_probe_low_m, Which::Leaves);
+    traces.insert(traces.end(), leaves.begin(), leaves.end());
+    return joinedTraces(std::move(traces));
+}
+
+// A tessellated wall is one: of its pieces on one line.
+std::vector<StandingWalls::Trace> StandingWalls::joinedTraces(std::vector<Trace> traces) {
+    const auto kind = [](const Trace& t) { return std::tuple(t.axis, t.forward, t.double_sided, t.height_m); };
+    std::ranges::sort(traces, {}, [&](const Trace& t) { return std::tuple(kind(t), t.at, t.from, t.to, t.lean); });
+    std::vector<Trace> joined;
+    for (const Trace& t : traces) {
+        if (!joined.empty()) {
+            Trace& last = joined.back();
+            const bool straight = std::abs(last.skew) < same_slope && std::abs(t.skew) < same_slope;
+            if (kind(last) == kind(t) && last.at == t.at && t.from <= last.to + same_line_m && straight &&
+                std::abs(last.lean - t.lean) < same_slope) {
+                last.to = std::max(last.to, t.to);
+                continue;
+            }
+        }
+        joined.push_back(t);
+    }
+    return joined;
+}
+
+// A face of no solid: the chart goes on behind it, and backs are seen there neither close behind, nor along the face or
+// straight up. (They are within solids, and within what lacks the sides that touch others: cupboards, steps.)
 bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
     if (trace.double_sided) return false;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
                     behind = (trace.forward ? -1.0f : 1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
-    return std::ranges::any_of(skin_shares, [&](float share) {
-        const float at = glm::mix(trace.from, trace.to, share);
+    const int places = std::clamp(static_cast<int>(skins_per_m * (trace.to - trace.from)), skins_min, skins_max);
+    for (int i = 0; i < places; ++i) {
+        // Off the middle, where edges are.
+        const float at = glm::mix(trace.from, trace.to, (static_cast<float>(i) + 0.57f) / static_cast<float>(places));
         const glm::vec3 on_line =
             onPlane(chart, trace.axis == 0 ? glm::vec2(trace.at, at) : glm::vec2(at, trace.at), 0);
         const glm::vec3 beside = 2 * wall_margin_m * behind;
-        if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) return false;
+        if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) continue;
         const glm::vec3 from = on_line + beside + wall_probe_low_m * up;
-        return std::ranges::none_of(std::array{behind, along, -along, up},
-                                    [&](glm::vec3 d) { return seesBack(from, d); });
-    });
+        const auto seesBack = [&](glm::vec3 d) { return backAtM(from, d) < std::numeric_limits<float>::max(); };
+        if (backAtM(from, behind) > thick_m && !seesBack(along) && !seesBack(-along) && !seesBack(up)) return true;
+    }
+    return false;
 }
 
 bool StandingWalls::covers(const PlanarChart& chart, glm::vec3 p) const {
     const glm::vec2 at = flat(chart, p);
-    return std::ranges::any_of(boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t near) {
-        const uint32_t face = blocking_.faces[near];
+    return std::ranges::any_of(all_boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t face) {
         if (!std::ranges::binary_search(chart.faces, face)) return false;
         std::array<float, 3> side;
         for (size_t i = 0; i < 3; ++i) {
@@ -231,9 +286,9 @@ bool StandingWalls::covers(const PlanarChart& chart, glm::vec3 p) const {
     });
 }
 
-// Whether the first thing that a ray meets is the back of a face. Where a face and a back touch it is the face that
-// counts, as for rays of light.
-bool StandingWalls::seesBack(glm::vec3 from, glm::vec3 direction) const {
+// How far off the first thing that a ray meets is where that is the back of a face; else the largest number. Where a
+// face and a back touch it is the face that counts, as for rays of light.
+float StandingWalls::backAtM(glm::vec3 from, glm::vec3 direction) const {
     float end_m = 0;  // of the level
     for (uint32_t i = 0; i < 8; ++i) {
         const glm::vec3 corner = glm::mix(level_.min_m, level_.max_m, glm::vec3(i & 1, i >> 1 & 1, i >> 2));
@@ -256,7 +311,7 @@ bool StandingWalls::seesBack(glm::vec3 from, glm::vec3 direction) const {
             nearest_m = std::min(nearest_m, away_m);
         }
     }
-    return back_m < face_m - same_line_m;
+    return back_m < face_m - same_line_m ? back_m : none;
 }
 
 }  // namespace dimmer::cook

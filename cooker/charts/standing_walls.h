@@ -37,33 +37,43 @@ class StandingWalls {
     StandingWalls(std::span<const PlanarFace> faces, Blocking blocking);
 
     // The middles of solids that are thinner than a filtered texel reaches, and single skins with open air behind them,
-    // over which the chart goes on. Each stands on the chart at wall_probe_low_m, and at wall_probe_high_m or as high
-    // as there is room. In the order of axis and place. Cost: that of the faces at the two heights over the chart, and
-    // of up to three rays behind each single-sided one of them.
+    // over which the chart goes on. Each stands on the chart at wall_probe_low_m (leaves at leaf_probe_low_m), and at
+    // wall_probe_high_m or as high as there is room, leaning or not. In the order of axis and place. Cost: that of the
+    // faces at the two heights over the chart, and of some rays behind each single-sided wall.
     std::vector<WallLine> on(const PlanarChart& chart) const;
 
    private:
-    // The trace of a blocking triangle on a plane.
+    // The trace of blocking triangles in one plane at a height over a chart.
     struct Trace : WallLine {
         bool forward = false;       // its front looks towards larger coordinates
-        bool double_sided = false;  // of the triangle, which leaves a trace of either direction
+        bool double_sided = false;  // of triangles that leave a trace of either direction
+        float lean = 0;             // metres that it moves along its axis with each metre of height
+        float skew = 0;             // and along the other axis, from its own middle on
+        float middle = 0;
+        float height_m = 0;
+
+        float atAlong(float place) const { return at + skew * (place - middle); }
     };
+    enum class Which { Fixed, Leaves, All };
 
     static auto placeOf(const Trace& trace);
     static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high);
     static std::vector<Trace> standing(const std::vector<Trace>& low, std::vector<Trace> high);
-    std::vector<Trace> findTraces(const PlanarChart& chart, float height_m) const;
+    static std::vector<Trace> joinedTraces(std::vector<Trace> traces);
+    std::vector<Trace> findTraces(const PlanarChart& chart, float height_m, Which which) const;
+    std::vector<Trace> lowTraces(const PlanarChart& chart) const;
     float highProbe(const PlanarChart& chart) const;
     glm::vec3 onPlane(const PlanarChart& chart, glm::vec2 at, float height_m) const;
     BoxTree::Box boxOver(const PlanarChart& chart, float height_m) const;
     bool isSkin(const PlanarChart& chart, const Trace& trace) const;
     bool covers(const PlanarChart& chart, glm::vec3 p) const;
-    bool seesBack(glm::vec3 from, glm::vec3 direction) const;
+    float backAtM(glm::vec3 from, glm::vec3 direction) const;
 
     std::span<const PlanarFace> faces_;
     Blocking blocking_;
     BoxTree boxes_;        // of blocking_.faces
-    BoxTree::Box level_;   // that holds them all
+    BoxTree all_boxes_;    // of all faces
+    BoxTree::Box level_;   // that holds what blocks
     float largest_m_ = 0;  // coordinate among theirs
 };
 

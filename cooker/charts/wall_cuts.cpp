@@ -32,9 +32,11 @@ struct Source {
 class WallCutter {
    public:
     WallCutter(Scene& scene, float texels_per_metre) : scene_(scene) {
-        addFaces(false, texels_per_metre);
+        const auto cuttable = [](const SceneMesh& mesh) { return hasLightmap(mesh) && mesh.uv1.empty(); };
+        addFaces(texels_per_metre, cuttable);
         cuttable_ = faces_.size();
-        addFaces(true, texels_per_metre);
+        addFaces(texels_per_metre,
+                 [&](const SceneMesh& mesh) { return !cuttable(mesh) && mesh.lighting != Lighting::Dynamic; });
         walls_ = StandingWalls(faces_, blocking());
     }
 
@@ -71,10 +73,11 @@ class WallCutter {
         return mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[triangle];
     }
 
-    void addFaces(bool of_unwraps, float texels_per_metre) {
+    // Of the meshes that `wanted` takes.
+    void addFaces(float texels_per_metre, auto&& wanted) {
         for (uint32_t m = 0; m < scene_.meshes.size(); ++m) {
             const SceneMesh& mesh = scene_.meshes[m];
-            if (!hasLightmap(mesh) || mesh.uv1.empty() == of_unwraps) continue;
+            if (!wanted(mesh)) continue;
             for (uint32_t t = 0; t < mesh.triangles.size(); ++t) {
                 std::array<glm::vec3, 3> c;
                 for (int i = 0; i < 3; ++i) c[static_cast<size_t>(i)] = mesh.positions_m[mesh.triangles[t][i]];
@@ -249,7 +252,8 @@ class WallCutter {
     Scene& scene_;
     std::vector<PlanarFace> faces_;
     std::vector<Source> sources_;
-    size_t cuttable_ = 0;  // the first so many faces; the others' meshes bring an unwrap, and they only block
+    size_t cuttable_ =
+        0;  // the first so many faces; the others only block: their meshes bring an unwrap, or have no lightmap
     StandingWalls walls_;
     uint32_t last_region_ = 0;  // that an earlier cut made
 };

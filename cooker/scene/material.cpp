@@ -194,6 +194,9 @@ class MaterialImporter {
                                   fmt::format("'alphaMode' is '{}'. Use OPAQUE, MASK or BLEND.", source.alphaMode));
         if (!isFiniteFloat(source.alphaCutoff)) return notFinite("alphaCutoff");
         material.alpha_cutoff = static_cast<float>(source.alphaCutoff);
+        // Exporters say of many a wall that it may have holes.
+        const float whole = material.alpha_mode == AlphaMode::Mask ? material.alpha_cutoff : 1;
+        if (!material.base_color_texture && material.alpha >= whole) material.alpha_mode = AlphaMode::Opaque;
         return {};
     }
 

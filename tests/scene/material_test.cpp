@@ -85,10 +85,24 @@ TEST(SceneMaterials, FactorsAndExtensions) {
     EXPECT_TRUE(window.double_sided);
     expectNear(window.emission_cd_m2, {200, 100, 0});
     const Material& mask = scene->materials[2];
-    EXPECT_EQ(mask.alpha_mode, AlphaMode::Mask);
+    EXPECT_EQ(mask.alpha_mode, AlphaMode::Opaque);  // nothing of it is cut out
     EXPECT_FLOAT_EQ(mask.alpha_cutoff, 0.3f);
     EXPECT_EQ(mask.metallic, 1.0f);  // glTF's default
     EXPECT_FALSE(mask.double_sided);
+}
+
+// A wall is one, whatever its material might do: what has no holes is opaque, and parts rooms as such.
+TEST(SceneMaterials, OpaqueIsWhatLetsNothingPass) {
+    LevelFile level = LevelFile::withFloor();
+    for (const float alpha : {1.0f, 0.6f, 0.4f})
+        for (const char* mode : {"MASK", "BLEND"})
+            level.addMaterial({{"alphaMode", mode}, {"pbrMetallicRoughness", {{"baseColorFactor", {1, 1, 1, alpha}}}}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    std::vector<AlphaMode> found;
+    for (size_t i = 1; i < scene->materials.size(); ++i) found.push_back(scene->materials[i].alpha_mode);
+    const auto opaque = AlphaMode::Opaque, mask = AlphaMode::Mask, blend = AlphaMode::Blend;
+    EXPECT_EQ(found, (std::vector{opaque, opaque, opaque, blend, mask, blend}));
 }
 
 TEST(SceneMaterials, FactorsOutsideTheirRange) {
