@@ -23,6 +23,26 @@ constexpr int compression_level = 1;
 // A file without its final name that is older than this belongs to no cook that still runs.
 constexpr auto abandoned_after = std::chrono::hours(24);
 
+// What the name of a file in the folder says of it. A folder may hold files of other people: KIND-KEY.entry is ours,
+// and while it is written six characters more.
+enum class Named { Other, Entry, Unfinished };
+Named named(std::string_view name) {
+    const auto all = [](std::string_view text, std::string_view of) {
+        return text.find_first_not_of(of) == std::string_view::npos;
+    };
+    const size_t dash = name.find('-'), dot = name.find('.');
+    if (dash == 0 || dash == std::string_view::npos || dot == std::string_view::npos || dot < dash) return Named::Other;
+    const std::string_view kind = name.substr(0, dash), key = name.substr(dash + 1, dot - dash - 1),
+                           rest = name.substr(dot);
+    const bool ours = all(kind, "abcdefghijklmnopqrstuvwxyz") && key.size() == 32 && all(key, "0123456789abcdef") &&
+                      rest.starts_with(extension);
+    if (!ours) return Named::Other;
+    if (rest == extension) return Named::Entry;
+    const std::string_view more = rest.substr(extension.size());
+    return more.size() == 7 && more[0] == '.' && more.find('.', 1) == std::string_view::npos ? Named::Unfinished
+                                                                                             : Named::Other;
+}
+
 struct EntryHeader {
     std::array<char, 8> magic;
     uint64_t stored_bytes, real_bytes;
@@ -89,7 +109,7 @@ std::string CacheStore::nameOf(std::string_view kind, const Key& key) {
 void CacheStore::markUsed(const std::string& name) const {
     const fs::path file = fs::path(name).filename();  // nothing outside of the folder
     std::error_code ignored;
-    if (file.extension() == extension) fs::last_write_time(folder_ / file, fs::file_time_type::clock::now(), ignored);
+    if (named(name) == Named::Entry) fs::last_write_time(folder_ / file, fs::file_time_type::clock::now(), ignored);
 }
 
 Entry CacheStore::find(std::string_view kind, const Key& key) const {
@@ -128,12 +148,11 @@ std::vector<std::string> CacheStore::trim(uint64_t bytes_max) const {
         // Others may remove files at the same time: what cannot be asked about is gone.
         std::error_code gone;
         const File file{it->path(), it->last_write_time(gone), it->file_size(gone)};
-        if (gone || file.path.filename().string().find(extension) == std::string::npos) continue;
-        if (file.path.extension() == extension)
-            files.push_back(file);
-        else if (now - file.used > abandoned_after)
-            fs::remove(file.path, gone);
-        sum += file.path.extension() == extension ? file.bytes : 0;
+        const Named what = gone ? Named::Other : named(file.path.filename().string());
+        if (what == Named::Unfinished && now - file.used > abandoned_after) fs::remove(file.path, gone);
+        if (what != Named::Entry) continue;
+        files.push_back(file);
+        sum += file.bytes;
     }
     std::ranges::sort(files,
                       [](const File& a, const File& b) { return std::tie(a.used, a.path) < std::tie(b.used, b.path); });

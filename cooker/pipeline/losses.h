@@ -14,8 +14,9 @@
 namespace dimmer::cook {
 
 inline constexpr float threshold_max = 1;  // what settings take at most
-// Thresholds that are tried, as multiples of the present ones.
-inline constexpr std::array<float, 13> threshold_rungs = {1, 1.5f, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
+// Thresholds that are tried, as multiples of the present ones; the last are the largest that there is, whatever those.
+inline constexpr std::array<float, 18> threshold_rungs = {1,  1.5f, 2,  3,  4,   6,   8,   12,   16,
+                                                          24, 32,   48, 64, 128, 256, 512, 1024, 1e30f};
 
 // A rung per light group.
 using Rungs = std::vector<uint8_t>;

@@ -68,7 +68,8 @@ SetScales divideByScales(Scene& scene) {
     of_always = glm::vec3(std::max({of_always.x, of_always.y, of_always.z}));
 
     for (PunctualLight& light : scene.lights)
-        light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);
+        if (light.bake != BakeMode::None)
+            light.intensity = divided(light.intensity, scales.of_group[groupOf(light.light_set)]);
     scene.sky_radiance_cd_m2 = divided(scene.sky_radiance_cd_m2, scales.of_group[always_group]);
     for (const Material& m : scene.materials) {
         scales.copy_of.push_back(static_cast<uint32_t>(scales.copy_of.size()));

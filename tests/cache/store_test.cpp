@@ -83,11 +83,13 @@ TEST(CacheStore, MarksNothingButEntries) {
     std::filesystem::create_directory(folder.path / "cache");
     const auto store = CacheStore::open(folder.path / "cache");
     ASSERT_TRUE(store);
-    const auto outside = writeText(folder, "light-1.entry", "not ours"),
+    const auto outside = writeText(folder, CacheStore::nameOf("light", keyOf(1)).c_str(), "not ours"),
                inside = writeText(folder, "cache/notes.txt", "mine");
     const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
     for (const auto& file : {outside, inside}) std::filesystem::last_write_time(file, before);
-    for (const char* name : {"../light-1.entry", "notes.txt", "", "light-2.entry"}) store->markUsed(name);
+    for (const std::string& name : {"../" + CacheStore::nameOf("light", keyOf(1)), std::string("notes.txt"),
+                                    std::string(), CacheStore::nameOf("light", keyOf(2))})
+        store->markUsed(name);
     for (const auto& file : {outside, inside}) EXPECT_EQ(std::filesystem::last_write_time(file), before);
 }
 
@@ -118,20 +120,27 @@ TEST(CacheStore, TheLeastRecentlyUsedGoFirst) {
     EXPECT_EQ(store->trim(0).size(), 2u);
 }
 
-// What a killed cook leaves goes after a day; what may belong to a running one, and what is not ours, stays.
+// What a killed cook leaves goes after a day; what may belong to a running one, and what is not ours, stays, however it
+// is called: a folder may be somebody's own.
 TEST(CacheStore, AbandonedFilesGo) {
     const TemporaryFolder folder;
     const auto store = CacheStore::open(folder.path);
     ASSERT_TRUE(store);
-    const auto now = std::filesystem::file_time_type::clock::now();
-    const auto fresh = writeText(folder, "light-1.entry.abcdef", "half"),
-               old = writeText(folder, "light-2.entry.x", "half"), other = writeText(folder, "notes.txt", "mine");
-    std::filesystem::last_write_time(old, now - std::chrono::hours(48));
-    std::filesystem::last_write_time(other, now - std::chrono::hours(48));
-    store->trim(0);
+    const std::string entry = CacheStore::nameOf("light", keyOf(1));
+    const auto fresh = writeText(folder, entry + ".abcdef", "half"), old = writeText(folder, entry + ".x4Yz01", "half");
+    const auto before = std::filesystem::file_time_type::clock::now() - std::chrono::hours(48);
+    std::filesystem::last_write_time(old, before);
+    std::vector<std::filesystem::path> others;
+    for (const std::string& name :
+         {std::string("notes.txt"), std::string("notes.entry.txt"), std::string("mine.entry"),
+          std::string("my-1.entry"), entry + ".bak", entry + ".orig.x", "my " + entry, "-" + entry}) {
+        others.push_back(writeText(folder, name, "mine"));
+        std::filesystem::last_write_time(others.back(), before);
+    }
+    EXPECT_THAT(store->trim(0), testing::IsEmpty());
     EXPECT_TRUE(std::filesystem::exists(fresh));
     EXPECT_FALSE(std::filesystem::exists(old));
-    EXPECT_TRUE(std::filesystem::exists(other));
+    for (const auto& other : others) EXPECT_TRUE(std::filesystem::exists(other)) << other;
 }
 
 TEST(CacheStore, AFolderThatCannotBeMade) {
