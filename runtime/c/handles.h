@@ -5,8 +5,11 @@
 #include <dimmer/dimmer.h>
 #include <dimmer/runtime.h>
 
+#include <cmath>
 #include <exception>
+#include <initializer_list>
 #include <new>
+#include <span>
 #include <variant>
 
 struct dimmer_pack {
@@ -50,6 +53,17 @@ bool given(const Pointers*... pointers) noexcept {
     if ((... && (pointers != nullptr))) return true;
     report(ErrorCode::InvalidArgument, "a null pointer was passed where an object or a place for a result is needed");
     return false;
+}
+
+// Whether all numbers are finite; reports it otherwise.
+inline bool finite(std::initializer_list<std::span<const float>> all) noexcept {
+    for (const std::span<const float> some : all)
+        for (const float v : some)
+            if (!std::isfinite(v)) {
+                report(ErrorCode::InvalidArgument, "a place or normal is not a finite number");
+                return false;
+            }
+    return true;
 }
 
 // The runtime behind the lights, or null, and reported, where it is the other one.

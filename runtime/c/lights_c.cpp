@@ -55,6 +55,13 @@ dimmer_images imagesOf(const LightmapImages& from) {
 }
 
 }  // namespace
+dimmer_result hasRoom(uint32_t moving_probes_max) {
+    static_assert(DIMMER_MOVING_PROBES_MAX == moving_probes_limit);
+    if (moving_probes_max <= moving_probes_limit) return DIMMER_OK;
+    return c::report({ErrorCode::InvalidArgument,
+                      fmt::format("moving_probes_max is {}; {} are the most", moving_probes_max, moving_probes_limit)});
+}
+
 }  // namespace dimmer::c
 
 using namespace dimmer;
@@ -68,6 +75,7 @@ dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_
         if (thread_count == 0 || thread_count > threads_max)
             return report({ErrorCode::InvalidArgument,
                            fmt::format("lights on the CPU run on 1 to {} threads, not {}", threads_max, thread_count)});
+        if (const dimmer_result ok = hasRoom(moving_probes_max); ok != DIMMER_OK) return ok;
         *lights = new dimmer_lights{CpuRuntime(pack->pack, thread_count, moving_probes_max)};
         return DIMMER_OK;
     });
@@ -91,6 +99,7 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
             return report({ErrorCode::InvalidArgument,
                            fmt::format("{} is no dimmer_buffering; it is DIMMER_IN_PLACE or DIMMER_DOUBLE_BUFFERED",
                                        static_cast<int>(asked.buffering))});
+        if (const dimmer_result ok = hasRoom(asked.moving_probes_max); ok != DIMMER_OK) return ok;
         auto created = Runtime::create(
             context, pack->pack,
             {.buffering = asked.buffering == DIMMER_DOUBLE_BUFFERED ? Buffering::Double : Buffering::InPlace,

@@ -103,7 +103,7 @@ dimmer_result dimmer_lights_get_probe_buffers(const dimmer_lights* lights, VkBuf
 
 dimmer_result dimmer_sample_radiance(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
                                      const float point_m[3], uint32_t* hint, float radiance[27]) {
-    if (!given(pack, point_m, radiance)) return DIMMER_INVALID_ARGUMENT;
+    if (!given(pack, point_m, radiance) || !finite({{point_m, 3}})) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         if (!holds(probes, word_count, pack->pack.data().probes.global.positions.size()))
             return DIMMER_INVALID_ARGUMENT;
@@ -117,7 +117,7 @@ dimmer_result dimmer_sample_radiance(const dimmer_pack* pack, const uint32_t* pr
 
 dimmer_result dimmer_sample_air(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
                                 const float point_m[3], const float normal[3], uint32_t* hint, float lux[3]) {
-    if (!given(normal, lux)) return DIMMER_INVALID_ARGUMENT;
+    if (!given(normal, lux) || !finite({{normal, 3}})) return DIMMER_INVALID_ARGUMENT;
     std::array<float, 27> radiance;
     const dimmer_result done = dimmer_sample_radiance(pack, probes, word_count, point_m, hint, radiance.data());
     if (done != DIMMER_OK) return done;
@@ -128,7 +128,8 @@ dimmer_result dimmer_sample_air(const dimmer_pack* pack, const uint32_t* probes,
 dimmer_result dimmer_sample_model(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
                                   const dimmer_model_slot* slot, const float point_m[3], const float normal[3],
                                   float lux[3]) {
-    if (!given(pack, slot, point_m, normal, lux)) return DIMMER_INVALID_ARGUMENT;
+    if (!given(pack, slot, point_m, normal, lux) || !finite({{point_m, 3}, {normal, 3}}))
+        return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         uint64_t count = 1;
         for (const uint32_t n : slot->counts) {

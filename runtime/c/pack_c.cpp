@@ -172,7 +172,8 @@ dimmer_result dimmer_pack_get_viewpoint(const dimmer_pack* pack, uint32_t index,
 dimmer_result dimmer_sample_lightmap(const dimmer_pack* pack, const uint32_t* irradiance, const uint32_t* direction,
                                      size_t texel_count, uint32_t page, const float uv[2],
                                      const float normal_tangent[3], float lux[3]) {
-    if (!given(pack, irradiance, direction, uv, normal_tangent, lux)) return DIMMER_INVALID_ARGUMENT;
+    if (!given(pack, irradiance, direction, uv, normal_tangent, lux) || !finite({{uv, 2}, {normal_tangent, 3}}))
+        return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
         const Pack& p = pack->pack;
         if (page >= p.pageCount()) return noSuch("page", page, p.pageCount());

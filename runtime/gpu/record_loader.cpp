@@ -92,7 +92,8 @@ Expected<void> RecordLoader::step(const RecordStore& store, uint64_t bytes_max) 
     }
     if (!staging_.buffer) DIMMER_TRY(create());
     // In pairs of records, as the store lays them out.
-    const uint64_t room = std::min(staging_bytes, std::max<uint64_t>(bytes_max / 16 * 16, 16));
+    const uint64_t asked = bytes_max == 0 ? staging_bytes : bytes_max;
+    const uint64_t room = std::min(staging_bytes, std::max<uint64_t>(asked / 16 * 16, 16));
     piece_ = pieces_.fill(store, std::span(staging_.mapped, room), regions_);
     DIMMER_TRY(send(store));
     pieces_.advance(store, piece_, ends_);

@@ -99,8 +99,9 @@ Expected<std::pair<VkSemaphore, uint64_t>> submit(Runtime& lights) {
 }
 
 // snippet: frame
-// Once: auto lights = dimmer::Runtime::create(vulkan, *dimmer::Pack::open("house.dimmer"));
-//       auto hall = lights->lightSet("hall");
+// Once: auto pack = dimmer::Pack::open("house.dimmer").value();    // throws where there is no such pack;
+//       auto lights = dimmer::Runtime::create(vulkan, pack).value();  // docs/integrate.md looks at each error
+//       auto hall = lights.lightSet("hall").value();
 dimmer::Expected<void> updateLights(dimmer::Runtime& lights, dimmer::LightSet hall, VkCommandBuffer commands) {
     if (auto ok = lights.setWeight(hall, {1, 0.2f, 0.2f}); !ok) return ok;
     const auto stats = lights.record(commands);

@@ -87,8 +87,10 @@ int misuse(const char* path) {
     dimmer_update_stats stats;
     uint32_t texel[1];
     float rgb[3] = {9, 9, 9};
-    const float uv[2] = {0.5f, 0.5f}, normal[3] = {0, 0, 1};
+    const float uv[2] = {0.5f, 0.5f}, normal[3] = {0, 0, 1}, nowhere[3] = {0, NAN, 0};
+    dimmer_model_slot slot;
     char bytes[256];
+    memset(&slot, 0, sizeof(slot));
     memset(bytes, 'x', sizeof(bytes));
 
     EXPECT_FAILURE(DIMMER_IO, "no/such.dimmer", dimmer_pack_open("no/such.dimmer", &pack));
@@ -104,6 +106,8 @@ int misuse(const char* path) {
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "1 to 1024 threads", dimmer_lights_create_cpu(pack, 0, 0, &lights));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "1 to 1024 threads",
                    dimmer_lights_create_cpu(pack, UINT32_MAX, 0, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "moving_probes_max is 16777217",
+                   dimmer_lights_create_cpu(pack, 1, DIMMER_MOVING_PROBES_MAX + 1, &lights));
     EXPECT(lights == NULL);
     EXPECT_OK(dimmer_lights_create_cpu(pack, 2, 0, &lights));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "\"set0\"", dimmer_lights_set_weight(lights, 0, 2.5f));
@@ -122,6 +126,11 @@ int misuse(const char* path) {
     EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_discard_recorded(lights));
     EXPECT_FAILURE(DIMMER_UNSUPPORTED, "on the CPU", dimmer_lights_wait(lights, NULL));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2048", dimmer_sample_lightmap(pack, texel, texel, 1, 0, uv, normal, rgb));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "finite",
+                   dimmer_sample_lightmap(pack, texel, texel, 2048, 0, nowhere, normal, rgb));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "finite", dimmer_sample_air(pack, texel, 1, nowhere, normal, NULL, rgb));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "finite", dimmer_sample_air(pack, texel, 1, normal, nowhere, NULL, rgb));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "finite", dimmer_sample_model(pack, texel, 1, &slot, normal, nowhere, rgb));
     EXPECT_FAILURE(DIMMER_NOT_FOUND, "no page 2", dimmer_sample_lightmap(pack, texel, texel, 2048, 2, uv, normal, rgb));
     dimmer_lights_destroy(lights);
     dimmer_pack_close(pack);

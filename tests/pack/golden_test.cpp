@@ -9,6 +9,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
 namespace dimmer {
 namespace {
 
@@ -80,6 +84,13 @@ TEST(PackGolden, EveryVersionIsReadOrRefusedByName) {
                   HasSubstr(fmt::format("of format version {}, this build reads version {}", version, format::version)),
                   HasSubstr("cook the level again with this build")));
     }
+}
+
+TEST(PackGolden, TheFormatsPageHasTheVersionThatIsWritten) {
+    std::ifstream file(std::filesystem::path(DIMMER_SOURCE_DIR) / "docs/format.md");
+    const std::string page(std::istreambuf_iterator<char>(file), {});
+    EXPECT_THAT(page, HasSubstr(fmt::format("| 8 | u32 | version | {}; a reader", format::version)));
+    EXPECT_THAT(page, HasSubstr(fmt::format("\n| {} | ", format::version)));
 }
 
 }  // namespace

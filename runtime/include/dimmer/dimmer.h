@@ -160,9 +160,12 @@ dimmer_result dimmer_pack_get_model_mesh(const dimmer_pack* pack, uint32_t index
 
 typedef struct dimmer_lights dimmer_lights;
 
+/* Room for more probes of models that move is refused: these are half a gigabyte. */
+#define DIMMER_MOVING_PROBES_MAX (1u << 24)
+
 /* On the CPU, with `thread_count` threads (1 to 1024, the caller's included) and room for `moving_probes_max` probes of
- * models that move: some 60 bytes each, 32 of which are touched at once, and each model takes a multiple of 8. Keeps
- * what it needs of the pack alive. */
+ * models that move (at most DIMMER_MOVING_PROBES_MAX): some 60 bytes each, 32 of which are touched at once, and each
+ * model takes a multiple of 8. Keeps what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
 /* Null is allowed. Waits for what dimmer_lights_submit() sent, and for nothing else: of the caller's submissions those
@@ -214,7 +217,8 @@ dimmer_result dimmer_lights_get_pages(const dimmer_lights* lights, const uint32_
                                       const uint32_t** direction, size_t* texel_count);
 
 /* Irradiance in lux, bilinear, of pages as above. `uv`: 0..1 over the page; `normal_tangent`: the unit normal in the
- * texel's tangent frame, {0, 0, 1} for the surface's own. Any thread, while nothing writes these pages. */
+ * texel's tangent frame, {0, 0, 1} for the surface's own. Numbers that are not finite are refused. Any thread, while
+ * nothing writes these pages. */
 dimmer_result dimmer_sample_lightmap(const dimmer_pack* pack, const uint32_t* irradiance, const uint32_t* direction,
                                      size_t texel_count, uint32_t page, const float uv[2],
                                      const float normal_tangent[3], float lux[3]);
@@ -250,7 +254,8 @@ dimmer_result dimmer_lights_get_probes(const dimmer_lights* lights, const uint32
 /* Light at a point of the air, from probes as above: irradiance in lux on a surface with this unit normal, or radiance
  * in cd/m2, 9 coefficients of real spherical harmonics (probe_grid.h), r g b each. `hint` may be null; with the last
  * query's answer in it (DIMMER_NONE at first, one per thread) a query nearby is faster. Outside of the level: the light
- * of the grid's nearest point; without a global grid: black. Any thread, while nothing updates the probes. */
+ * of the grid's nearest point; without a global grid: black. Numbers that are not finite are refused, here and below: a
+ * point that is none would have the light of some corner. Any thread, while nothing updates the probes. */
 dimmer_result dimmer_sample_air(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
                                 const float point_m[3], const float normal[3], uint32_t* hint, float lux[3]);
 dimmer_result dimmer_sample_radiance(const dimmer_pack* pack, const uint32_t* probes, size_t word_count,
@@ -280,14 +285,15 @@ typedef struct dimmer_vulkan {
 } dimmer_vulkan;
 
 typedef enum dimmer_buffering {
-    DIMMER_IN_PLACE = 0,       /* updates write the pages and probes that frames read, between barriers of their own */
-    DIMMER_DOUBLE_BUFFERED = 1 /* two sets of pages and of probes that take turns; twice the memory for both */
+    DIMMER_IN_PLACE = 0,        /* updates write the pages and probes that frames read, between barriers of their own */
+    DIMMER_DOUBLE_BUFFERED = 1, /* two sets of pages and of probes that take turns; twice the memory for both */
+    DIMMER_BUFFERING_MAX_ENUM = 0x7fffffff /* none: so that any int is a value, and refused */
 } dimmer_buffering;
 
 /* All 0 is the default. */
 typedef struct dimmer_vulkan_options {
     dimmer_buffering buffering;
-    uint32_t moving_probes_max; /* room for so many probes of models that move */
+    uint32_t moving_probes_max; /* room for so many probes of models that move; at most DIMMER_MOVING_PROBES_MAX */
     uint32_t frames_in_flight;  /* updates that may be on their way at a time, 1 to 8; 0 is 1 */
     /* Device memory for texels' records, in bytes; 0: room for all. Less needs start_without_records: then light sets
      * are loaded and dropped as the game moves on. */
@@ -382,8 +388,9 @@ dimmer_result dimmer_lights_get_records_state(const dimmer_lights* lights, uint3
 /* Of the memory for records: what a light set's take, and what no set's do. */
 dimmer_result dimmer_lights_get_record_bytes(const dimmer_lights* lights, uint32_t light_set, uint64_t* set_bytes,
                                              uint64_t* free_bytes);
-/* Once a frame: copies a piece of about so many bytes, 4 MiB at most, and never waits. Of all that was asked for
- * since nothing was loading, `done_bytes` of `total_bytes` are there; either may be null. Equal: all is loaded. */
+/* Once a frame: copies a piece of about so many bytes, 4 MiB at most (and for 0), and never waits. Of all that was
+ * asked for since nothing was loading, `done_bytes` of `total_bytes` are there; either may be null. Equal: all is
+ * loaded. */
 dimmer_result dimmer_lights_continue_loading(dimmer_lights* lights, uint64_t bytes_max, uint64_t* done_bytes,
                                              uint64_t* total_bytes);
 

@@ -173,9 +173,9 @@ class Runtime : public LightState {
     // Of the memory for texels' records: what a light set's take, and what no set's do. 0 in modes gather and scatter.
     uint64_t recordBytes(LightSet set) const;
     uint64_t freeRecordBytes() const;
-    // Copies the next piece, of at most so many bytes (and 4 MiB), and returns at once; while the last piece is under
-    // way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while it
-    // loads.
+    // Copies the next piece, of at most so many bytes (and 4 MiB, as for 0), and returns at once; while the last piece
+    // is under way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while
+    // it loads.
     Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
 
     // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns, even
