@@ -224,6 +224,11 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
     for (uint32_t m = 0; m < scene.meshes.size(); ++m)
         if (const std::string& fault = scene.meshes[m].uv1_fault; !fault.empty())
             out.warnings.push_back({m, fmt::format("TEXCOORD_1 is no lightmap unwrap ({}); charts were made", fault)});
+    for (uint32_t m = 0; m < scene.meshes.size(); ++m)
+        if (scene.meshes[m].uv1_crosses_walls)
+            out.warnings.push_back({m,
+                                    "thin walls stand on it, where its own TEXCOORD_1 goes on: light leaks past them; "
+                                    "part the mesh and its unwrap there, or leave TEXCOORD_1 out"});
     std::vector<Placed> charts;
     std::vector<PlanarFace> planar;
     std::vector<uint32_t> planar_ids;

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <span>
 
 namespace dimmer::cook {
@@ -35,18 +36,17 @@ class WallCutter {
         const auto cuttable = [](const SceneMesh& mesh) { return hasLightmap(mesh) && mesh.uv1.empty(); };
         addFaces(texels_per_metre, cuttable);
         cuttable_ = faces_.size();
+        addFaces(texels_per_metre, [&](const SceneMesh& mesh) { return hasLightmap(mesh) && !cuttable(mesh); });
+        lightmapped_ = faces_.size();
         addFaces(texels_per_metre,
-                 [&](const SceneMesh& mesh) { return !cuttable(mesh) && mesh.lighting != Lighting::Dynamic; });
+                 [&](const SceneMesh& mesh) { return !hasLightmap(mesh) && mesh.lighting != Lighting::Dynamic; });
         walls_ = StandingWalls(faces_, blocking());
     }
 
     // Along::Edges: charts that are turned alone; the others have been cut before.
     void run(Along along) {
-        constexpr uint32_t no_side_limit = 1u << 20;
-        auto charts = planarCharts(std::span(faces_).first(cuttable_), no_side_limit, {}, along);
-        if (along == Along::Edges) std::erase_if(charts, [](const PlanarChart& chart) { return !chart.turned; });
-        std::vector<std::vector<std::vector<Piece>>> parts(charts.size());
-        tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
+        const std::vector<PlanarChart> charts = chartsOf(0, cuttable_, along);
+        const std::vector<Parts> parts = partsOf(charts);
         uint32_t region = last_region_;
         std::map<uint32_t, Replacements> by_mesh;
         for (size_t c = 0; c < charts.size(); ++c) {
@@ -58,10 +58,41 @@ class WallCutter {
                         {piece, region, &charts[c]});
             }
         }
+        markUncut(along);
         for (const auto& [mesh, replacements] : by_mesh) rebuild(scene_.meshes[mesh], replacements);
     }
 
    private:
+    using Parts = std::vector<std::vector<Piece>>;  // of a chart, what its walls leave beside one another
+
+    std::vector<PlanarChart> chartsOf(size_t first, size_t end, Along along) const {
+        constexpr uint32_t no_side_limit = 1u << 20;
+        auto charts = planarCharts(std::span(faces_).subspan(first, end - first), no_side_limit, {}, along);
+        if (along == Along::Edges) std::erase_if(charts, [](const PlanarChart& chart) { return !chart.turned; });
+        for (PlanarChart& chart : charts)
+            for (uint32_t& face : chart.faces) face += static_cast<uint32_t>(first);
+        return charts;
+    }
+
+    std::vector<Parts> partsOf(const std::vector<PlanarChart>& charts) const {
+        std::vector<Parts> parts(charts.size());
+        tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
+        return parts;
+    }
+
+    // Meshes that bring an unwrap, with triangles that go on under walls.
+    void markUncut(Along along) {
+        for (const Parts& parts : partsOf(chartsOf(cuttable_, lightmapped_, along))) {
+            std::map<uint32_t, uint32_t> parts_of;  // per face
+            for (const auto& part : parts) {
+                std::set<uint32_t> faces;
+                for (const Piece& piece : part) faces.insert(piece.face);
+                for (const uint32_t face : faces)
+                    if (++parts_of[face] > 1) scene_.meshes[sources_[face].mesh].uv1_crosses_walls = true;
+            }
+        }
+    }
+
     struct Replacement {
         Piece piece;
         uint32_t region;
@@ -103,7 +134,7 @@ class WallCutter {
         return found;
     }
 
-    std::vector<std::vector<Piece>> partsOf(const PlanarChart& chart) const {
+    Parts partsOf(const PlanarChart& chart) const {
         const std::vector<WallLine> cuts = walls_.on(chart);
         if (cuts.empty()) return {};
         std::vector<Piece> all;
@@ -252,8 +283,8 @@ class WallCutter {
     Scene& scene_;
     std::vector<PlanarFace> faces_;
     std::vector<Source> sources_;
-    size_t cuttable_ =
-        0;  // the first so many faces; the others only block: their meshes bring an unwrap, or have no lightmap
+    // The first faces are those of meshes without an unwrap, the next of those with one; the others have no lightmap.
+    size_t cuttable_ = 0, lightmapped_ = 0;
     StandingWalls walls_;
     uint32_t last_region_ = 0;  // that an earlier cut made
 };

@@ -72,6 +72,7 @@ struct SceneMesh {
     std::vector<glm::vec2> uv0;                // for textures; empty when the file has none
     std::vector<glm::vec2> uv1;                // the file's lightmap UVs; empty when it has none
     std::string uv1_fault;                     // why those are no unwrap and uv1 was emptied (charts/file_uv.h)
+    bool uv1_crosses_walls = false;            // walls stand on triangles of theirs (charts/wall_cuts.h)
     std::vector<glm::uvec3> triangles;         // counter-clockwise seen from the front; no degenerate ones
     std::vector<uint32_t> triangle_materials;  // index into Scene::materials
     std::vector<uint32_t> triangle_regions;    // empty, or per triangle: different regions never share a chart

@@ -324,6 +324,24 @@ TEST(WallCuts, AnUnwrappedNeighbourIsLeftOut) {
     EXPECT_GT(scene.meshes[floor].triangles.size(), 2u);
     EXPECT_EQ(scene.meshes.back().triangles.size(), 2u);
     EXPECT_EQ(scene.meshes.back().uv1.size(), 4u);
+    EXPECT_FALSE(scene.meshes.back().uv1_crosses_walls);
+}
+
+// What brings an unwrap stays whole, and where a wall stands on its triangles that is said.
+TEST(WallCuts, AnUnwrapUnderAWallIsSaid) {
+    for (const float z : {0.0f, 20.0f}) {
+        Scene scene = twoRooms();
+        addQuad(scene, "carpet", {0, 0.002f, z}, {0, 0, 1.4f}, {3, 0, 0}, 0).uv1 = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        cutAtWalls(scene, 4);
+        EXPECT_EQ(scene.meshes.back().triangles.size(), 2u);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        ASSERT_EQ(charts->warnings.size(), z == 0 ? 1u : 0u);
+        if (z > 0) continue;
+        EXPECT_EQ(scene.meshes[charts->warnings[0].mesh].node, "carpet");
+        EXPECT_NE(charts->warnings[0].text.find("thin walls stand on it"), std::string::npos);
+    }
 }
 
 // Nobody is parted by pillars that one walks between.
