@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 namespace dimmer::cook {
 namespace {
@@ -168,49 +169,57 @@ std::vector<stbrp_rect> rectsOf(std::span<const glm::uvec2> charts, const std::v
     return rects;
 }
 
-// One page as small as will do, else as many of the largest size as are needed. Sides are multiples of 64 texels.
-bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& out) {
-    constexpr uint32_t side_step = 64;
+// On square pages of `side`, as many as it takes; false where those are more than `count_max`. Pages end with the
+// lowest chart of all.
+bool fillPages(std::span<const glm::uvec2> charts, uint32_t side, uint32_t count_max, Unwrap& out) {
     std::vector<uint32_t> rest(charts.size());
-    for (uint32_t i = 0; i < rest.size(); ++i) rest[i] = i;
+    std::iota(rest.begin(), rest.end(), 0u);
     out.charts.resize(charts.size());
-    auto keep = [&](const std::vector<stbrp_rect>& rects, uint32_t page) {
-        for (const stbrp_rect& r : rects)
-            if (r.was_packed)
-                out.charts[static_cast<size_t>(r.id)] = {page, static_cast<uint32_t>(r.x), static_cast<uint32_t>(r.y),
-                                                         static_cast<uint32_t>(r.w), static_cast<uint32_t>(r.h)};
-    };
-    uint64_t area = 0;
-    uint32_t side = side_step;
-    for (const glm::uvec2 c : charts) {
-        area += uint64_t{c.x} * c.y;
-        side = std::max({side, c.x, c.y});
-    }
-    auto roundUp = [](uint64_t v) { return static_cast<uint32_t>((v + side_step - 1) / side_step * side_step); };
-    side = std::max(roundUp(side), roundUp(static_cast<uint64_t>(std::sqrt(static_cast<double>(area)))));
-    for (; side <= page_size; side += side_step) {
-        auto rects = rectsOf(charts, rest);
-        if (!tryPack(rects, static_cast<int>(side), static_cast<int>(side))) continue;
-        uint32_t height = 0;
-        for (const auto& r : rects) height = std::max(height, static_cast<uint32_t>(r.y + r.h));
-        keep(rects, 0);
-        out.page_width = side;
-        out.page_height = std::min(page_size, (height + 7) / 8 * 8);
-        out.page_count = 1;
-        return true;
-    }
-    out.page_width = out.page_height = page_size;
+    uint32_t height = 0;
     for (out.page_count = 0; !rest.empty(); ++out.page_count) {
-        if (out.page_count == 256) return false;
+        if (out.page_count == count_max) return false;
         auto rects = rectsOf(charts, rest);
-        tryPack(rects, static_cast<int>(page_size), static_cast<int>(page_size));
-        keep(rects, out.page_count);
+        tryPack(rects, static_cast<int>(side), static_cast<int>(side));
         rest.clear();
-        for (const auto& r : rects)
-            if (!r.was_packed) rest.push_back(static_cast<uint32_t>(r.id));
+        for (const stbrp_rect& r : rects) {
+            const auto id = static_cast<uint32_t>(r.id);
+            if (!r.was_packed) {
+                rest.push_back(id);
+                continue;
+            }
+            const auto x = static_cast<uint32_t>(r.x), y = static_cast<uint32_t>(r.y);
+            out.charts[id] = {out.page_count, x, y, charts[id].x, charts[id].y};
+            height = std::max(height, y + charts[id].y);
+        }
         std::ranges::sort(rest);
     }
+    out.page_count = std::max(out.page_count, 1u);
+    out.page_width = side;
+    out.page_height = std::min(side, (height + 7) / 8 * 8);
     return true;
+}
+
+// As few pages as will do, and those as small as will do. Sides are multiples of 64 texels.
+bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& out) {
+    constexpr uint32_t side_step = 64, pages_max = 256;
+    uint64_t area = 0;
+    uint32_t largest = side_step;
+    for (const glm::uvec2 c : charts) {
+        area += uint64_t{c.x} * c.y;
+        largest = std::max({largest, c.x, c.y});
+    }
+    const auto sideFor = [&](uint32_t pages) {
+        const auto side = static_cast<uint32_t>(std::sqrt(static_cast<double>(area) / pages));
+        return std::max((side + side_step - 1) / side_step, (largest + side_step - 1) / side_step) * side_step;
+    };
+    uint32_t pages = 1;
+    if (sideFor(1) > page_size || !fillPages(charts, page_size, 1, out)) {
+        if (!fillPages(charts, page_size, pages_max, out)) return false;
+        pages = out.page_count;
+    }
+    for (uint32_t side = sideFor(pages); side < page_size; side += side_step)
+        if (fillPages(charts, side, pages, out)) return true;
+    return fillPages(charts, page_size, pages_max, out);
 }
 
 BoxTree boxesOf(const RayScene& rays) {

@@ -125,7 +125,11 @@ CookCache::CookCache(CacheStore store, const std::filesystem::path& pack) : stor
 }
 
 void CookCache::dependsOn(const std::string& part, const Key& key) {
-    now_[part] = key.hex();
+    now_[round_ + part] = key.hex();
+}
+
+void CookCache::beginRound(int round) {
+    round_ = round == 0 ? "" : fmt::format("fit round {}: ", round + 1);
 }
 
 std::string CookCache::whyMissing(Find find, const std::vector<std::string>& parts) const {
@@ -133,7 +137,9 @@ std::string CookCache::whyMissing(Find find, const std::vector<std::string>& par
     if (last_.empty()) return "first cook of this pack here";
     std::vector<std::string> changed;
     for (const std::string& part : parts) {
-        const auto now = now_.find(part), last = last_.find(part);
+        // What all rounds depend on alike has no round's name.
+        const std::string named = now_.contains(round_ + part) ? round_ + part : part;
+        const auto now = now_.find(named), last = last_.find(named);
         if (now == now_.end()) continue;
         if (last == last_.end())
             changed.push_back(part + " is new");
@@ -147,7 +153,7 @@ std::optional<std::vector<std::byte>> CookCache::find(std::string_view kind, con
                                                       const std::vector<std::string>& parts) {
     Entry entry = look(kind, key);
     const bool hit = entry.find == Find::Hit;
-    lines_.push_back({what, hit, hit ? "" : whyMissing(entry.find, parts)});
+    lines_.push_back({round_ + what, hit, hit ? "" : whyMissing(entry.find, parts)});
     return hit ? std::optional(std::move(entry.bytes)) : std::nullopt;
 }
 
@@ -252,7 +258,7 @@ std::vector<Sparse<ProbeTermLight>> CookCache::findSites(const std::string& what
         why = missing == asked || worst == Find::Damaged
                   ? whyMissing(worst, partsOfGroup(what))
                   : fmt::format("{} of {} groups of places are new", missing, asked);
-    lines_.push_back({"light at probe places: " + what, missing == 0, why});
+    lines_.push_back({round_ + "light at probe places: " + what, missing == 0, why});
     return light;
 }
 

@@ -38,6 +38,8 @@ class CookCache {
     // What the cook depends on, by name; the names of those that differ from the last cook's explain what is made
     // again.
     void dependsOn(const std::string& part, const Key& key);
+    // Of those after the first, which cook with other settings: each is compared with the last cook's same round.
+    void beginRound(int round);
 
     std::optional<ChartsEntry> findCharts(const Key& key);
     void keepCharts(const Key& key, const ChartsEntry& entry);
@@ -90,6 +92,7 @@ class CookCache {
 
     CacheStore store_;
     Key ledger_;
+    std::string round_;  // before the names of what a further round of `--fit` makes and depends on
     std::map<std::string, std::string> last_, now_;  // part -> key
     std::vector<std::string> used_;                  // entries found or kept, by name
     std::vector<std::string> kept_;                  // by this cook, likewise

@@ -47,6 +47,7 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         result.stats.warnings = import_warnings;
         result.stats.suggested_combinations.clear();
         LossTable losses;
+        if (cache) cache->beginRound(round);
         auto pack = cookScene(scene, result.profile, quality, progress, result.stats, cache, &losses);
         if (!pack) return pack;
         const PackCost cost = costOf(*pack);

@@ -1,5 +1,6 @@
 // Cooks with a cache: the same bytes as without, and only what changed is made again.
 #include <cache/scene_keys.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <pipeline/small_level.h>
 
@@ -460,6 +461,37 @@ TEST_F(CachedCook, SaysWhySinceAPackThatWasFoundWhole) {
     EXPECT_EQ(why(level, "pack"), "");
     lamp(level, 1)["intensity"] = 50;
     EXPECT_EQ(why(level, "light set 'both'"), "lamps of light set 'both' changed");
+}
+
+// Each round of --fit is another cook: a moved lamp changes no threshold in any of them.
+TEST_F(CachedCook, RoundsOfFitAreEachComparedWithTheirOwn) {
+    LevelFile level = houseOfTwo();
+    const uint64_t whole = costOf(run(level, false).pack).dynamic;
+    std::string fitted(quick_profile);
+    fitted.insert(fitted.find('{') + 1, fmt::format(R"("budgets": {{"dynamic": {}}}, )", whole * 7 / 10));
+    SilentProgress silent;
+    const auto cookFitted = [&] {
+        const CookOptions options{.level = writeLevel(folder, level),
+                                  .pack = folder.path / "fitted.dimmer",
+                                  .profile = writeText(folder, "fitted.json", fitted).string(),
+                                  .quality = "draft",
+                                  .cache = folder.path / "cache",
+                                  .fit = true};
+        return cook(options, silent);
+    };
+    ASSERT_TRUE(cookFitted());
+    for (json& node : level.document["nodes"])
+        if (node.value("name", "") == "lamp3") node["translation"][0] = 8.7;
+    const auto again = cookFitted();
+    ASSERT_TRUE(again) << again.error().message;
+    std::set<std::string> made, all;
+    for (const CacheLine& line : again->stats.cache) {
+        EXPECT_EQ(line.why.find("threshold"), std::string::npos) << line.what << ": " << line.why;
+        all.insert(line.what);
+        if (!line.reused) made.insert(line.what);
+    }
+    EXPECT_TRUE(made.contains("light set 'two'"));
+    EXPECT_TRUE(all.contains("fit round 2: light set 'two'"));
 }
 
 TEST_F(CachedCook, KnowsAPackByItsPlaceHoweverItIsNamed) {

@@ -276,6 +276,23 @@ TEST(Charts, LieApartOnTheirPages) {
 }
 
 // What a remedy says of a lower density: charts as unwrap() then makes them, and the pages that it packs.
+// Sixteen squares fill a page of 256 texels; one more took a second of as much, for all of it: now 9 and 8 lie on two
+// of 192.
+TEST(Charts, NeedingTwoPagesTakeSmallOnes) {
+    for (const int count : {16, 17}) {
+        Scene scene;
+        const uint32_t grey = addMaterial(scene, lambert(0.5f));
+        for (int i = 0; i < count; ++i)
+            addQuad(scene, "square", {20.0f * static_cast<float>(i), 0, 0}, {0, 0, 7.5f}, {7.5f, 0, 0}, grey);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        EXPECT_EQ(charts->page_count, count == 16 ? 1u : 2u);
+        EXPECT_EQ(charts->page_width, count == 16 ? 256u : 192u);
+        EXPECT_LE(charts->page_height, charts->page_width);
+    }
+}
+
 TEST(Charts, OfLongerTexelsAreForetold) {
     const Scene scene = manyQuads();
     const RayScene rays(scene);

@@ -62,6 +62,17 @@ TEST_F(LightStateTest, AnUnknownNameSuggestsTheNearest) {
     EXPECT_THAT(state.lightSet("front").error().message, HasSubstr("door:front"));
 }
 
+// As printf() writes them, down to what is no float any more.
+TEST_F(LightStateTest, NumbersOfATextAreThoseThatProgramsPrint) {
+    ASSERT_TRUE(state.apply("hall=+0.5,alarm=1e-50,door:front=+1.0e-1"));
+    EXPECT_EQ(weightOf("hall"), Weight(0.5f));
+    EXPECT_EQ(weightOf("alarm"), Weight(0));
+    EXPECT_EQ(state.open(door("front")), 0.1f);
+    for (const char* bad : {"hall=+-0.5", "hall=++1", "hall=+", "hall=1e60", "hall=1e999", "hall=0.5x"})
+        EXPECT_FALSE(state.apply(bad)) << bad;
+    EXPECT_EQ(weightOf("hall"), Weight(0.5f));
+}
+
 TEST_F(LightStateTest, RefusedWeightsChangeNothing) {
     const float nan = std::numeric_limits<float>::quiet_NaN(), infinity = std::numeric_limits<float>::infinity();
     for (float bad : {nan, infinity, -infinity, -0.001f, 1.001f}) {
