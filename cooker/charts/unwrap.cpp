@@ -212,14 +212,13 @@ bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& o
         const auto side = static_cast<uint32_t>(std::sqrt(static_cast<double>(area) / pages));
         return std::max((side + side_step - 1) / side_step, (largest + side_step - 1) / side_step) * side_step;
     };
-    uint32_t pages = 1;
-    if (sideFor(1) > page_size || !fillPages(charts, page_size, 1, out)) {
-        if (!fillPages(charts, page_size, pages_max, out)) return false;
-        pages = out.page_count;
-    }
+    for (uint32_t side = sideFor(1); side <= page_size; side += side_step)
+        if (fillPages(charts, side, 1, out)) return true;
+    if (!fillPages(charts, page_size, pages_max, out)) return false;
+    const uint32_t pages = out.page_count;
     for (uint32_t side = sideFor(pages); side < page_size; side += side_step)
         if (fillPages(charts, side, pages, out)) return true;
-    return fillPages(charts, page_size, pages_max, out);
+    return fillPages(charts, page_size, pages, out);
 }
 
 BoxTree boxesOf(const RayScene& rays) {

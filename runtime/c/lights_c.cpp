@@ -54,14 +54,14 @@ dimmer_images imagesOf(const LightmapImages& from) {
             .layers = from.layers};
 }
 
-}  // namespace
 dimmer_result hasRoom(uint32_t moving_probes_max) {
     static_assert(DIMMER_MOVING_PROBES_MAX == moving_probes_limit);
     if (moving_probes_max <= moving_probes_limit) return DIMMER_OK;
-    return c::report({ErrorCode::InvalidArgument,
-                      fmt::format("moving_probes_max is {}; {} are the most", moving_probes_max, moving_probes_limit)});
+    return report({ErrorCode::InvalidArgument,
+                   fmt::format("moving_probes_max is {}; {} are the most", moving_probes_max, moving_probes_limit)});
 }
 
+}  // namespace
 }  // namespace dimmer::c
 
 using namespace dimmer;

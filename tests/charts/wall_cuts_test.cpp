@@ -148,13 +148,16 @@ TEST(WallCuts, WallsPartRoomsHoweverTheyStand) {
     }
 }
 
-// A leaf hangs over the floor, and parts it.
+// A leaf that fills a corridor hangs over its floor, and parts it.
 TEST(WallCuts, ALeafOverAGapPartsTheFloor) {
     for (const float gap_m : {0.0f, 0.012f, 0.03f}) {
         SCOPED_TRACE(gap_m);
-        Scene scene = twoRooms();
+        Scene scene;
+        const uint32_t white = addMaterial(scene, lambert(0.5f));
         scene.doors.emplace_back();
-        addSolid(scene, "leaf", {0, 1 + gap_m, 0}, {0.02f, 1, 0.45f}, 0, 0);
+        addSolid(scene, "floor", {0, -0.1f, 0}, {4, 0.1f, 1.5f}, white);
+        addSolid(scene, "ceiling", {0, 2.8f, 0}, {4, 0.1f, 1.5f}, white);
+        addSolid(scene, "leaf", {0, 1.35f + gap_m / 2, 0}, {0.02f, 1.35f - gap_m / 2, 1.5f}, white, 0);
         cutAtWalls(scene, 4);
         const RayScene rays(scene);
         const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});

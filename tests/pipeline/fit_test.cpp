@@ -153,9 +153,8 @@ TEST_P(FitTheHouse, WithTheErrorThatWasPredicted) {
 }
 
 // From 3 %, many sets end at the largest threshold that there is; from 0.02 %, a fifth asks for hundreds of times as
-// much. Where a receiver may hold two records of some
-// seventeen, the next brightest comes back for each that goes: no threshold halves those, and beyond a tenth fewer
-// texels lose less.
+// much. Where a receiver may hold two records of some seventeen, the next brightest comes back for each that goes: no
+// threshold halves those, and beyond a tenth fewer texels lose less.
 INSTANTIATE_TEST_SUITE_P(FromTheThresholdsOf, FitTheHouse,
                          testing::Values(HouseSettings{"0.01", "0", 0.5}, HouseSettings{"0.03", "0", 0.5},
                                          HouseSettings{"0.01", "2", 0.9}, HouseSettings{"0.0002", "0", 0.2}));
