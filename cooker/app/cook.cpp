@@ -66,8 +66,8 @@ std::string gridNote(const CookResult& result) {
     const Profile& p = result.profile;
     if (p.global_grid == GridMode::Off) return "global grid: none, grids.global is off\n";
     if (p.probes_max == 0) return "global grid: none, grids.probes_max is 0\n";
-    if (p.global_grid == GridMode::On) return "global grid: none could be made; see the warnings\n";
-    return "global grid: none, nothing in the level moves; --set grids.global=on makes one\n";
+    if (!result.grid_wanted) return "global grid: none, nothing in the level moves; --set grids.global=on makes one\n";
+    return "global grid: none could be made; see the warnings\n";
 }
 
 void printTable(const CookResult& result, const PackCost& cost) {
@@ -99,9 +99,7 @@ nlohmann::ordered_json fittedJson(const CookResult& result) {
 }
 
 nlohmann::ordered_json suggestions(const CookStats& stats) {
-    auto list = nlohmann::ordered_json::array();
-    for (const auto& [first, second] : stats.suggested_combinations) list.push_back({first, second});
-    return list;
+    return nlohmann::ordered_json(stats.suggested_combinations);
 }
 
 nlohmann::ordered_json toJson(const CookResult& result, const std::filesystem::path& pack) {
@@ -233,7 +231,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->capture_default_str();
     c->add_flag(
         "--suggest-combinations", a->suggest_combinations,
-        "print the pairs of doors whose light depends on each other (each a warning, too) for dimmer_combinations");
+        "print for dimmer_combinations the doors whose light depends on each other, or may (warnings tell of most)");
     auto* per_set_passes =
         c->add_flag("--per-set-passes", a->options.per_set_passes,
                     "gather once per light set instead of sharing rays: the same pack, slower; for comparison");

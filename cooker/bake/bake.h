@@ -88,7 +88,7 @@ struct DoorPair {
     uint32_t first = 0, second = 0;  // into Scene::doors
     // What is off without the combination while both are open, measured with few rays: luminous flux over paths that
     // need one open and ask how the other stands, over all that opening the lesser of the two alone changes; infinite
-    // where that is nothing.
+    // where that is hardly anything.
     float loss = 0;
 };
 

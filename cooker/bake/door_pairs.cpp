@@ -16,8 +16,9 @@ namespace {
 // The flux over a whole level is measured: so many rays in all, within limits per texel.
 constexpr size_t measuring_rays = 200'000;
 constexpr size_t texel_rays_min = 4, texel_rays_max = 16;
-// Of the threshold, where a door by itself moves no light at all.
+// Of the threshold, where a door by itself moves hardly any light.
 constexpr double black_share = 0.1;
+constexpr double all_but_gaps = 10;  // times what the lesser door moves by itself: leaves do not shut tight
 // Of two fluxes only the ratio counts: what the last bounces bring goes to both.
 constexpr float measured_tail_max = 0.05f;
 
@@ -213,10 +214,11 @@ std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeS
         const auto alone = [&](uint32_t door) { return sum([&](const DoorFlux& f) { return f.alone[door]; }); };
         const auto [less, more] = std::minmax({alone(first), alone(second)});
         const double off = sum([&](const DoorFlux& f) { return f.pairs[p].flux; });
-        // Behind one door in a row with another there may be no light at all but through both: a room that is black
-        // instead of dim shows, however little of the first one's light gets there.
-        const bool all = !(less > 0) && off > black_share * static_cast<double>(settings.threshold) * more;
-        const auto loss = all ? INFINITY : static_cast<float>(less > 0 ? off / less : 0);
+        // Behind one door in a row with another there may be no light but through both, what comes past its edges
+        // aside: a room that is black instead of dim shows, however little of the first one's light gets there.
+        const bool all = off > all_but_gaps * less;
+        const bool shows = off > black_share * static_cast<double>(settings.threshold) * more;
+        const float loss = !all ? static_cast<float>(off / less) : shows ? INFINITY : 0;
         if (loss > settings.threshold) found.push_back({first, second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);

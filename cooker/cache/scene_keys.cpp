@@ -1,5 +1,6 @@
 #include <cache/scene_keys.h>
 
+#include <probes/air_box.h>
 #include <scene/ies.h>
 
 #include <map>
@@ -236,6 +237,7 @@ Key gridSettingsKey(const GridSettings& s, const Scene& scene) {
     key.add(s.probes_max).add(s.min_spacing_m).add(s.sites).add(s.site_rays).add(s.tolerance);
     key.add(uint32_t{s.uniform}).add(uint32_t{s.fit}).add(uint32_t{s.visibility});
     addPlayAreas(key, scene);
+    for (const glm::vec3 place : placesOfMotion(scene)) add(key, place);
     return key.finish();
 }
 

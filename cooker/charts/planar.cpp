@@ -1,6 +1,8 @@
 #include <charts/planar.h>
 
 #include <charts/box_tree.h>
+#include <charts/groups.h>
+#include <charts/polygon.h>
 #include <charts/raster.h>
 
 #include <tbb/parallel_for.h>
@@ -37,22 +39,6 @@ constexpr float ray_slack_m = 1e-4f, ray_slack_per_m = 1e-6f;
 constexpr size_t shadows_max = 512;
 // A surface this high over another one hides it: the points that texels are lit at lie lower (texels.cpp).
 constexpr float hiding_m = 5e-4f;
-
-struct Rect {
-    glm::vec2 min{1e30f}, max{-1e30f};
-    void add(glm::vec2 p) {
-        min = glm::min(min, p);
-        max = glm::max(max, p);
-    }
-    void add(const Rect& r) {
-        add(r.min);
-        add(r.max);
-    }
-    float area() const { return (max.x - min.x) * (max.y - min.y); }
-    bool touches(const Rect& r) const {
-        return glm::all(glm::lessThanEqual(min, r.max)) && glm::all(glm::lessThanEqual(r.min, max));
-    }
-};
 
 struct Axes {
     glm::vec3 u, v;
@@ -123,7 +109,7 @@ class PlaneGrouper {
         if (standing.blocked && findWalls(standing, apart)) merge(apart);
         std::map<uint32_t, PlanarChart> by_root;
         for (uint32_t i = 0; i < ids_.size(); ++i) {
-            const uint32_t root = find(i);
+            const uint32_t root = groups_.find(i);
             auto [it, fresh] = by_root.try_emplace(root);
             if (fresh)
                 it->second = {axes_.u, axes_.v, rects_[root].min, rects_[root].max - rects_[root].min, density_, {}};
@@ -135,13 +121,15 @@ class PlaneGrouper {
     }
 
     // Faces that hang together and whose edges lie along other axes than these: a building that is turned. Each with
-    // the axes that are theirs. What walls stand on is cut along a chart's axes alone (wall_cuts.h).
+    // the axes that are theirs.
     std::vector<std::pair<Axes, std::vector<uint32_t>>> turned() {
-        parent_.resize(ids_.size());
-        std::iota(parent_.begin(), parent_.end(), 0u);
-        for (const Contact& c : contacts_) parent_[find(c.a)] = find(c.b);
+        groups_ = Groups(ids_.size());
+        for (const Contact& c : contacts_) {
+            const uint32_t a = groups_.find(c.a), b = groups_.find(c.b);
+            if (a != b) groups_.join(a, b);
+        }
         std::map<uint32_t, std::vector<uint32_t>> parts;
-        for (uint32_t i = 0; i < ids_.size(); ++i) parts[find(i)].push_back(i);
+        for (uint32_t i = 0; i < ids_.size(); ++i) parts[groups_.find(i)].push_back(i);
         std::vector<std::pair<Axes, std::vector<uint32_t>>> found;
         for (auto& [root, part] : parts) {
             const auto along = alongEdges(part);
@@ -220,32 +208,17 @@ class PlaneGrouper {
         std::ranges::sort(contacts_, {}, [](const Contact& c) { return std::tuple(-c.length_m, c.a, c.b); });
     }
 
-    uint32_t find(uint32_t i) {
-        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-        return i;
-    }
-
     // Longest contacts first, so that a doorway's strip joins one room rather than joining two rooms.
     void merge(const Apart& apart) {
-        parent_.resize(ids_.size());
-        std::iota(parent_.begin(), parent_.end(), 0u);
+        groups_ = Groups(ids_.size());
+        for (const auto& [a, b] : apart) groups_.keepApart(a, b);
         rects_.resize(ids_.size());
         for (uint32_t i = 0; i < ids_.size(); ++i) rects_[i] = rectOf(i);
-        // Of charts, by their roots: the lesser list goes into the longer one, so that few are moved often.
-        std::vector<std::set<uint32_t>> apart_from(ids_.size());
-        for (const auto& [a, b] : apart) apart_from[a].insert(b);
         for (const Contact& c : contacts_) {
-            uint32_t a = find(c.a), b = find(c.b);
-            if (a == b || !fitsTogether(a, b) || apart_from[a].contains(b)) continue;
-            if (apart_from[a].size() < apart_from[b].size()) std::swap(a, b);
-            parent_[b] = a;
-            rects_[a].add(rects_[b]);
-            for (const uint32_t other : apart_from[b]) {
-                apart_from[other].erase(b);
-                apart_from[other].insert(a);
-                apart_from[a].insert(other);
-            }
-            apart_from[b].clear();
+            const uint32_t a = groups_.find(c.a), b = groups_.find(c.b);
+            if (a == b || !fitsTogether(a, b) || groups_.areApart(a, b)) continue;
+            const auto [whole, part] = groups_.join(a, b);
+            rects_[whole].add(rects_[part]);
         }
     }
 
@@ -300,7 +273,7 @@ class PlaneGrouper {
         const size_t before = apart.size();
         const float reach = filter_reach_texels / density_;
         std::vector<uint32_t> root(ids_.size());
-        for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = find(i);
+        for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = groups_.find(i);
         std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
         if (ids_.size() < 2) return false;
         glm::vec2 largest_m(0);
@@ -434,41 +407,38 @@ class PlaneGrouper {
     std::vector<std::array<glm::vec2, 3>> flat_;
     BoxTree boxes_;  // of the faces, in the plane
     std::vector<Contact> contacts_;
-    std::vector<uint32_t> parent_;
+    Groups groups_{0};
     std::vector<Rect> rects_;
 };
 
 }  // namespace
 
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const Standing& standing, Along along) {
+                                      const Standing& standing) {
     std::map<PlaneKey, std::vector<uint32_t>> planes;
     for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
     std::vector<PlanarChart> charts;
-    const auto chart = [&](PlaneGrouper& plane, bool turned) {
-        for (PlanarChart& made : plane.charts(standing)) {
-            made.turned = turned;
-            charts.push_back(std::move(made));
-        }
+    const auto chart = [&](PlaneGrouper& plane) {
+        std::ranges::move(plane.charts(standing), std::back_inserter(charts));
     };
     for (auto& [key, ids] : planes) {
         const Axes axes(faces[ids[0]].normal);
         PlaneGrouper plane(faces, ids, axes, side_max_texels);
-        auto turned = along == Along::Edges ? plane.turned() : decltype(plane.turned()){};
+        auto turned = plane.turned();
         if (turned.empty()) {
-            chart(plane, false);
+            chart(plane);
             continue;
         }
         std::set<uint32_t> others;
         for (auto& [own_axes, part] : turned) {
             others.insert(part.begin(), part.end());
             PlaneGrouper own(faces, std::move(part), own_axes, side_max_texels);
-            chart(own, true);
+            chart(own);
         }
         std::erase_if(ids, [&](uint32_t id) { return others.contains(id); });
         if (ids.empty()) continue;
         PlaneGrouper rest(faces, std::move(ids), axes, side_max_texels);
-        chart(rest, false);
+        chart(rest);
     }
     // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
     std::ranges::sort(charts, {}, [](const PlanarChart& c) { return c.faces[0]; });

@@ -24,16 +24,11 @@ struct PlanarFace {
     uint32_t region = 0;  // nor do faces of different regions
 };
 
-// What a chart's axes lie along: a plane has some of its own, by its normal alone; parts of it that hang together may
-// have others, along most of their outline.
-enum class Along { Plane, Edges };
-
 struct PlanarChart {
     glm::vec3 u_axis, v_axis;  // unit; u x v = normal
     glm::vec2 min_m, size_m;   // of the chart's rectangle, along the axes
     float texels_per_metre;
     std::vector<uint32_t> faces;  // indices into the input, ascending
-    bool turned = false;          // its axes are not those that its plane alone would have
 };
 
 // Doors move, so their leaves share no chart with the level, nor closed ones with open ones.
@@ -53,6 +48,6 @@ struct Standing {
 // Deterministic. Cost: near O(n log n) where the boxes of faces in one plane overlap few others; where something stands
 // on them, times those within two texels of it.
 std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const Standing& standing = {}, Along axes = Along::Edges);
+                                      const Standing& standing = {});
 
 }  // namespace dimmer::cook

@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -16,13 +18,19 @@ namespace {
 constexpr float reach_texels = 2.5f;   // thinner than this leaks: bilinear filtering plus half a texel of averaging
 constexpr float doorway_min_m = 0.5f;  // narrower ones are gaps between a shelf's boards
 constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0.9f;
-constexpr float lean_max = 0.5f;  // what leans more is a roof
+constexpr float lean_max = 1.75f;  // what leans more is a roof
 // A trace need not be quite straight along the axis, over so much of its length and of a texel.
 constexpr float skew_share = 0.02f, skew_texels = 0.25f, skew_max_m = 0.1f;
 constexpr float same_slope = 1e-3f;
+// Directions of what stands on one chart are looked for so far: those of a tower of 256 sides.
+constexpr size_t turns_max = 64;
+constexpr float facet_min_texels = 0.25f;  // shorter ones have no direction of their own
+constexpr float rows_gap_texels = 1.1f,
+                row_cos = 0.7f;   // of a round wall of eight sides, as thick as the filter reaches
 constexpr float skins_per_m = 1;  // places at which is looked what is behind a skin, within limits
 constexpr int skins_min = 3, skins_max = 16;
 constexpr float thick_m = 1;       // of solids: farther behind a face, a back is another wall's
+constexpr float gap_m = 0.25f;     // between skins that is no room
 constexpr float first_step_m = 1;  // of a ray; twice as far each time
 
 float largest(glm::vec3 p) {
@@ -48,6 +56,49 @@ std::vector<WallLine> joined(std::vector<WallLine> lines) {
         same->to = std::max(same->to, l.to);
     }
     return joined;
+}
+
+struct LineEnd {
+    glm::vec2 at, outwards;
+    uint32_t line;
+};
+
+// A round wall is a row of stretches whose lines have no more than an eighth of a turn from one to the next.
+void addRows(WallLines& walls, float reach_m) {
+    std::vector<LineEnd> ends;
+    std::vector<BoxTree::Box> boxes;
+    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
+        const WallLine& l = walls.lines[i];
+        const Turn& turn = walls.turns[l.turn];
+        const glm::vec2 along = turn.axis(1 - l.axis), on_line = l.at * turn.axis(l.axis);
+        for (const float sign : {-1.0f, 1.0f}) {
+            const glm::vec2 at = on_line + (sign < 0 ? l.from : l.to) * along;
+            ends.push_back({at, sign * along, i});
+            boxes.push_back({{at - reach_m, 0}, {at + reach_m, 0}});
+        }
+    }
+    std::vector<uint32_t> row(walls.lines.size());
+    std::iota(row.begin(), row.end(), 0u);
+    const auto find = [&](uint32_t i) {
+        while (row[i] != i) i = row[i] = row[row[i]];
+        return i;
+    };
+    const BoxTree tree(std::move(boxes));
+    for (const LineEnd& a : ends)
+        for (const uint32_t other : tree.touching({{a.at, 0}, {a.at, 0}})) {
+            const LineEnd& b = ends[other];
+            if (walls.lines[a.line].turn == walls.lines[b.line].turn || -glm::dot(a.outwards, b.outwards) < row_cos)
+                continue;
+            row[find(a.line)] = find(b.line);
+        }
+    std::vector<float> row_m(walls.lines.size(), 0);
+    std::vector<uint32_t> row_lines(walls.lines.size(), 0);
+    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
+        row_m[find(i)] += walls.lines[i].to - walls.lines[i].from;
+        ++row_lines[find(i)];
+    }
+    for (uint32_t i = 0; i < walls.lines.size(); ++i)
+        if (row_lines[find(i)] > 1) walls.lines[i].row_m = row_m[find(i)];
 }
 
 glm::vec2 flat(const PlanarChart& chart, glm::vec3 p) {
@@ -76,19 +127,82 @@ StandingWalls::StandingWalls(std::span<const PlanarFace> faces, Blocking blockin
     all_boxes_ = BoxTree(std::move(boxes));
 }
 
-std::vector<WallLine> StandingWalls::on(const PlanarChart& chart) const {
-    const float reach_m = reach_texels / chart.texels_per_metre;
+WallLines StandingWalls::on(const PlanarChart& chart, float coarsest_texels_per_metre) const {
+    const float reach_m = reach_texels / coarsest_texels_per_metre;
+    WallLines found{turnsOf(chart), {}};
+    for (uint32_t t = 0; t < found.turns.size(); ++t)
+        for (WallLine& line : alongAxes(t == 0 ? chart : turned(chart, found.turns[t]), reach_m)) {
+            line.turn = t;
+            found.lines.push_back(line);
+        }
+    addRows(found, rows_gap_texels / chart.texels_per_metre);
+    return found;
+}
+
+// Its own axes, and those along which something stands on it otherwise, the longest first.
+std::vector<Turn> StandingWalls::turnsOf(const PlanarChart& chart) const {
+    std::vector<Segment> segments = segmentsAt(chart, wall_probe_low_m, Which::All);
+    const std::vector<Segment> leaves = segmentsAt(chart, leaf_probe_low_m, Which::Leaves);
+    segments.insert(segments.end(), leaves.begin(), leaves.end());
+    std::erase_if(segments, [&](const Segment& s) {
+        return !(std::abs(s.rise) < lean_max * glm::length(s.normal)) ||
+               glm::length(s.b - s.a) * chart.texels_per_metre < facet_min_texels;
+    });
+    std::ranges::stable_sort(segments, std::greater(), [](const Segment& s) { return glm::length(s.b - s.a); });
+    std::vector<Turn> turns{{}};
+    for (const Segment& s : segments) {
+        const auto fits = [&](const Turn& turn) {
+            const glm::vec2 off = glm::abs(turn.on(s.b - s.a));
+            return std::min(off.x, off.y) <= s.slackM(chart.texels_per_metre);
+        };
+        if (std::ranges::any_of(turns, fits)) continue;
+        glm::vec2 d = glm::normalize(s.b - s.a);
+        while (!(d.x > 0 && d.y >= 0)) d = {-d.y, d.x};
+        turns.push_back({d.x, d.y});
+        if (turns.size() == turns_max) break;
+    }
+    return turns;
+}
+
+PlanarChart StandingWalls::turned(const PlanarChart& chart, Turn turn) const {
+    PlanarChart other = chart;
+    other.u_axis = turn.cos * chart.u_axis + turn.sin * chart.v_axis;
+    other.v_axis = turn.cos * chart.v_axis - turn.sin * chart.u_axis;
+    glm::vec2 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
+    for (const uint32_t face : chart.faces)
+        for (const glm::vec3 p : faces_[face].corners_m) {
+            low = glm::min(low, flat(other, p));
+            high = glm::max(high, flat(other, p));
+        }
+    other.min_m = low, other.size_m = high - low;
+    return other;
+}
+
+std::vector<WallLine> StandingWalls::alongAxes(const PlanarChart& chart, float reach_m) const {
     const std::vector<Trace> traces =
         standing(lowTraces(chart), joinedTraces(findTraces(chart, highProbe(chart), Which::All)));
     std::vector<WallLine> lines;
     for (const Trace& a : traces) {
         if (isSkin(chart, a)) lines.push_back(a);
         if (a.forward) continue;
-        // A solid between a's front, looking back, and b's, looking forward.
+        // A solid between a's front, looking back, and the next that looks forward, stretch by stretch.
+        std::vector<glm::vec2> open{{a.from, a.to}};
         for (const Trace& b : near(traces, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
             if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
-            const float from = std::max(a.from, b.from), to = std::min(a.to, b.to);
-            if (to - from > same_line_m) lines.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
+            std::vector<glm::vec2> left;
+            for (const glm::vec2 stretch : open) {
+                const float from = std::max(stretch.x, b.from), to = std::min(stretch.y, b.to);
+                if (!(to - from > same_line_m)) {
+                    left.push_back(stretch);
+                    continue;
+                }
+                lines.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
+                left.push_back({stretch.x, from});
+                left.push_back({to, stretch.y});
+            }
+            std::erase_if(left, [](glm::vec2 stretch) { return !(stretch.y - stretch.x > same_line_m); });
+            open = std::move(left);
+            if (open.empty()) break;
         }
     }
     return joined(std::move(lines));
@@ -114,7 +228,10 @@ float StandingWalls::highProbe(const PlanarChart& chart) const {
             continue;
         Polygon over;
         for (const glm::vec3 p : face.corners_m) over.push_back(flat(chart, p));
-        for (int axis = 0; axis < 2; ++axis) over = clipped(clipped(over, axis, low[axis], 1), axis, high[axis], -1);
+        for (int axis = 0; axis < 2; ++axis) {
+            const glm::vec2 normal = Turn{}.axis(axis);
+            over = clipped(clipped(over, normal, low[axis], 1), normal, high[axis], -1);
+        }
         facing.emplace_back(height, polygonArea(over));
     }
     std::ranges::sort(facing);
@@ -177,12 +294,16 @@ BoxTree::Box StandingWalls::boxOver(const PlanarChart& chart, float height_m) co
     return box;
 }
 
-std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m,
-                                                            Which which) const {
+float StandingWalls::Segment::slackM(float texels_per_metre) const {
+    return std::max(same_line_m,
+                    std::min({skew_share * glm::length(b - a), skew_texels / texels_per_metre, skew_max_m}));
+}
+
+std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const PlanarChart& chart, float height_m,
+                                                              Which which) const {
     const PlanarFace& any = faces_[chart.faces[0]];
     const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
-    const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
-    std::vector<Trace> traces;
+    std::vector<Segment> segments;
     for (const uint32_t near : boxes_.touching(boxOver(chart, height_m))) {
         const PlanarFace& face = faces_[blocking_.faces[near]];
         if (which != Which::All && (face.group != 0) != (which == Which::Leaves)) continue;
@@ -196,22 +317,30 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& c
             ends[n++] = flat(chart, glm::mix(face.corners_m[i], face.corners_m[j], d[i] / (d[i] - d[j])));
         }
         if (n < 2) continue;
-        const glm::vec2 normal = flat(chart, face.normal);
-        const bool double_sided = blocking_.double_sided[near];
+        segments.push_back({ends[0], ends[1], flat(chart, face.normal), glm::dot(any.normal, face.normal),
+                            blocking_.double_sided[near]});
+    }
+    return segments;
+}
+
+std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m,
+                                                            Which which) const {
+    const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
+    std::vector<Trace> traces;
+    for (const Segment& segment : segmentsAt(chart, height_m, which)) {
+        const auto& [a, b, normal, rise, double_sided] = segment;
         for (int axis = 0; axis < 2; ++axis) {
-            const auto& [a, b] = ends;
             const int along = 1 - axis;
-            const float length_m = std::abs(a[along] - b[along]);
-            const float skew_m = std::min({skew_share * length_m, skew_texels / chart.texels_per_metre, skew_max_m});
-            if (std::abs(a[axis] - b[axis]) > std::max(same_line_m, skew_m)) continue;
-            const float lean = -glm::dot(any.normal, face.normal) / normal[axis];
+            if (std::abs(a[axis] - b[axis]) > segment.slackM(chart.texels_per_metre)) continue;
+            const float lean = -rise / normal[axis];
             if (!(std::abs(lean) < lean_max)) continue;
             const float at = 0.5f * (a[axis] + b[axis]), from = std::max(low[along], std::min(a[along], b[along])),
                         to = std::min(high[along], std::max(a[along], b[along]));
             if (to - from < same_line_m || at < low[axis] - wall_margin_m || at > high[axis] + wall_margin_m) continue;
             const bool forward = normal[axis] > 0;
             Trace trace{{axis, at, from, to}, forward, double_sided, lean};
-            trace.skew = length_m > same_line_m ? (b[axis] - a[axis]) / (b[along] - a[along]) : 0;
+            const bool long_enough = std::abs(a[along] - b[along]) > same_line_m;
+            trace.skew = long_enough ? (b[axis] - a[axis]) / (b[along] - a[along]) : 0;
             trace.middle = 0.5f * (a[along] + b[along]);
             trace.height_m = height_m;
             traces.push_back(trace);
@@ -251,8 +380,9 @@ std::vector<StandingWalls::Trace> StandingWalls::joinedTraces(std::vector<Trace>
     return joined;
 }
 
-// A face of no solid: the chart goes on behind it, and backs are seen there neither close behind, nor along the face or
-// straight up. (They are within solids, and within what lacks the sides that touch others: cupboards, steps.)
+// A face of no solid: the chart goes on behind it, with room, and backs are seen there neither close behind, nor along
+// the face or straight up. (They are within solids, and within what lacks the sides that touch others: cupboards,
+// steps.)
 bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
     if (trace.double_sided) return false;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
@@ -266,8 +396,10 @@ bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
         const glm::vec3 beside = 2 * wall_margin_m * behind;
         if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) continue;
         const glm::vec3 from = on_line + beside + wall_probe_low_m * up;
-        const auto seesBack = [&](glm::vec3 d) { return backAtM(from, d) < std::numeric_limits<float>::max(); };
-        if (backAtM(from, behind) > thick_m && !seesBack(along) && !seesBack(-along) && !seesBack(up)) return true;
+        const Met next = meets(from, behind);
+        const bool open = next.at_m > (next.is_back ? thick_m : gap_m);
+        if (open && !meets(from, along).is_back && !meets(from, -along).is_back && !meets(from, up).is_back)
+            return true;
     }
     return false;
 }
@@ -286,9 +418,8 @@ bool StandingWalls::covers(const PlanarChart& chart, glm::vec3 p) const {
     });
 }
 
-// How far off the first thing that a ray meets is where that is the back of a face; else the largest number. Where a
-// face and a back touch it is the face that counts, as for rays of light.
-float StandingWalls::backAtM(glm::vec3 from, glm::vec3 direction) const {
+// The first thing on a ray. Where a face and a back touch it is the face that counts, as for rays of light.
+StandingWalls::Met StandingWalls::meets(glm::vec3 from, glm::vec3 direction) const {
     float end_m = 0;  // of the level
     for (uint32_t i = 0; i < 8; ++i) {
         const glm::vec3 corner = glm::mix(level_.min_m, level_.max_m, glm::vec3(i & 1, i >> 1 & 1, i >> 2));
@@ -311,7 +442,7 @@ float StandingWalls::backAtM(glm::vec3 from, glm::vec3 direction) const {
             nearest_m = std::min(nearest_m, away_m);
         }
     }
-    return back_m < face_m - same_line_m ? back_m : none;
+    return back_m < face_m - same_line_m ? Met{back_m, true} : Met{face_m, false};
 }
 
 }  // namespace dimmer::cook

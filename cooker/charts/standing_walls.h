@@ -10,10 +10,26 @@
 
 namespace dimmer::cook {
 
-// Where a wall stands on a chart: a stretch of the line x = at (axis 0) or y = at (axis 1), in metres along its axes.
+// Axes that are turned in a chart's plane against its own.
+struct Turn {
+    float cos = 1, sin = 0;
+
+    glm::vec2 on(glm::vec2 p) const { return {cos * p.x + sin * p.y, cos * p.y - sin * p.x}; }
+    glm::vec2 axis(int i) const { return i == 0 ? glm::vec2(cos, sin) : glm::vec2(-sin, cos); }
+};
+
+// Where a wall stands on a chart: a stretch of the line x = at (axis 0) or y = at (axis 1), in metres along axes that
+// may be turned.
 struct WallLine {
     int axis = 0;
     float at = 0, from = 0, to = 0;
+    uint32_t turn = 0;  // whose axes
+    float row_m = 0;    // of a round wall: all stretches of its row
+};
+
+struct WallLines {
+    std::vector<Turn> turns;      // the first one is none
+    std::vector<WallLine> lines;  // in the order of turn, axis and place
 };
 
 inline constexpr float same_line_m = 2e-3f;     // what lies closer is one line
@@ -36,11 +52,12 @@ class StandingWalls {
     // `faces` must outlive this.
     StandingWalls(std::span<const PlanarFace> faces, Blocking blocking);
 
-    // The middles of solids that are thinner than a filtered texel reaches, and single skins with open air behind them,
-    // over which the chart goes on. Each stands on the chart at wall_probe_low_m (leaves at leaf_probe_low_m), and at
-    // wall_probe_high_m or as high as there is room, leaning or not. In the order of axis and place. Cost: that of the
-    // faces at the two heights over the chart, and of some rays behind each single-sided wall.
-    std::vector<WallLine> on(const PlanarChart& chart) const;
+    // The middles of solids that are thinner than a filtered texel of the coarsest density reaches, and single skins
+    // with open air behind them, over which the chart goes on. Each stands on the chart at wall_probe_low_m (leaves at
+    // leaf_probe_low_m), and at wall_probe_high_m or as high as there is room, leaning or not. Cost: that of the faces
+    // at the two heights over the chart for each pair of directions at right angles that they have, and of some rays
+    // behind each single-sided wall.
+    WallLines on(const PlanarChart& chart, float coarsest_texels_per_metre) const;
 
    private:
     // The trace of blocking triangles in one plane at a height over a chart.
@@ -54,12 +71,25 @@ class StandingWalls {
 
         float atAlong(float place) const { return at + skew * (place - middle); }
     };
+    // Of one triangle, along the chart's axes.
+    struct Segment {
+        glm::vec2 a, b, normal;  // the triangle's own, as it looks from above
+        float rise;              // of that normal
+        bool double_sided;
+
+        // Metres to the line that both ends may lie beside, of a chart of so many texels per metre.
+        float slackM(float texels_per_metre) const;
+    };
     enum class Which { Fixed, Leaves, All };
 
     static auto placeOf(const Trace& trace);
     static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high);
     static std::vector<Trace> standing(const std::vector<Trace>& low, std::vector<Trace> high);
     static std::vector<Trace> joinedTraces(std::vector<Trace> traces);
+    std::vector<WallLine> alongAxes(const PlanarChart& chart, float reach_m) const;
+    std::vector<Turn> turnsOf(const PlanarChart& chart) const;
+    PlanarChart turned(const PlanarChart& chart, Turn turn) const;
+    std::vector<Segment> segmentsAt(const PlanarChart& chart, float height_m, Which which) const;
     std::vector<Trace> findTraces(const PlanarChart& chart, float height_m, Which which) const;
     std::vector<Trace> lowTraces(const PlanarChart& chart) const;
     float highProbe(const PlanarChart& chart) const;
@@ -67,7 +97,11 @@ class StandingWalls {
     BoxTree::Box boxOver(const PlanarChart& chart, float height_m) const;
     bool isSkin(const PlanarChart& chart, const Trace& trace) const;
     bool covers(const PlanarChart& chart, glm::vec3 p) const;
-    float backAtM(glm::vec3 from, glm::vec3 direction) const;
+    struct Met {
+        float at_m;  // the largest number: nothing
+        bool is_back;
+    };
+    Met meets(glm::vec3 from, glm::vec3 direction) const;
 
     std::span<const PlanarFace> faces_;
     Blocking blocking_;

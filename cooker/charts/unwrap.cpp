@@ -15,8 +15,6 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t padding_texels = 1;
-
 // A chart before it has a place: its size with padding, and its faces' corners relative to its rectangle.
 struct Placed {
     uint32_t width = 0, height = 0;

@@ -60,6 +60,8 @@ struct Unwrap {
     uint32_t faceOf(uint32_t triangle, bool back) const { return (back ? back_face : front_face)[triangle]; }
 };
 
+inline constexpr uint32_t padding_texels = 1;  // around a chart
+
 struct UnwrapOptions {
     float texels_per_metre = 4;
     uint32_t page_size = 2048;  // largest side of a page, at most 4096

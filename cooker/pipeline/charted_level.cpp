@@ -27,7 +27,7 @@ ChartedLevel::ChartedLevel(Scene level, const Profile& profile) : scene(std::mov
 }
 
 Expected<void> ChartedLevel::chart(const Profile& profile) {
-    cutAtWalls(scene, profile.texels_per_metre);
+    cutAtWalls(scene, profile.texels_per_metre, profile.page_size);
     rays.emplace(scene);
     auto unwrapped = unwrap(*rays, unwrapOptions(profile));
     if (!unwrapped) return std::unexpected(unwrapped.error());

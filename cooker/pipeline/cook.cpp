@@ -126,6 +126,7 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     for (auto* warnings : {&result.stats.warnings, &scene->warnings})
         warnings->insert(warnings->end(), idle->begin(), idle->end());
     result.profile = *profile;
+    result.grid_wanted = wantsGrid(*profile, *scene);
     auto cache = openCache(options, result.stats);
     const auto bytes = findOrMakePack(*scene, options, progress, cache ? &*cache : nullptr, result);
     if (cache) {

@@ -41,8 +41,8 @@ struct CookStats {
     uint32_t bounces = 0;
     double free_volume_m3 = 0;  // of the level, where probes may stand
     uint64_t peak_bytes = 0;    // of the whole process
-    // For `dimmer_combinations`: pairs of doors, as the level writes them, that lose light for want of it.
-    std::vector<std::pair<std::string, std::string>> suggested_combinations;
+    // For `dimmer_combinations`: doors, as the level writes them, that lose or may lose light for want of it.
+    std::vector<std::vector<std::string>> suggested_combinations;
     std::vector<std::string> warnings;
     std::vector<CacheLine> cache;  // per stage that a cache could keep; empty without one
 };
@@ -56,6 +56,7 @@ struct CookResult {
     PackData pack;
     Profile profile;             // as resolved, and fitted
     std::vector<Remedy> fitted;  // what had to be changed, in the order of the cooks that it took
+    bool grid_wanted = false;    // the global one, by profile and level
     uint64_t file_bytes = 0;
     CookStats stats;
 };

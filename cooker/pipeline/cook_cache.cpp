@@ -60,9 +60,9 @@ std::vector<std::byte> toBytes(const PackEntry& entry) {
     out.put(static_cast<uint32_t>(entry.warnings.size()));
     for (const std::string& warning : entry.warnings) out.putString(warning);
     out.put(static_cast<uint32_t>(entry.suggested_combinations.size()));
-    for (const auto& [first, second] : entry.suggested_combinations) {
-        out.putString(first);
-        out.putString(second);
+    for (const std::vector<std::string>& doors : entry.suggested_combinations) {
+        out.put(static_cast<uint32_t>(doors.size()));
+        for (const std::string& door : doors) out.putString(door);
     }
     out.put(static_cast<uint32_t>(entry.parts.size()));
     for (const std::string& part : entry.parts) out.putString(part);
@@ -83,9 +83,9 @@ std::optional<PackEntry> packFromBytes(std::span<const std::byte> bytes) {
     entry.bounces = in.get<uint32_t>();
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.warnings.push_back(in.getString());
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {
-        auto& [first, second] = entry.suggested_combinations.emplace_back();
-        first = in.getString();
-        second = in.getString();
+        auto& doors = entry.suggested_combinations.emplace_back();
+        for (uint64_t names = in.get<uint32_t>(); in.fits(names, 1) && names > 0; --names)
+            doors.push_back(in.getString());
     }
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) entry.parts.push_back(in.getString());
     for (uint64_t n = in.get<uint32_t>(); in.fits(n, 1) && n > 0; --n) {

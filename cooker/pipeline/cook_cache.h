@@ -24,7 +24,7 @@ struct PackEntry {
     std::vector<std::byte> pack;
     uint32_t bounces = 0;
     std::vector<std::string> warnings;
-    std::vector<std::pair<std::string, std::string>> suggested_combinations;
+    std::vector<std::vector<std::string>> suggested_combinations;
     std::vector<std::string> parts;  // names of the entries that it was made from: whoever finds the pack uses them too
     std::map<std::string, std::string> depends;  // part -> key of what they depend on, as of CookCache::dependsOn
     std::vector<Remedy> fitted;                  // what `--fit` changed

@@ -4,6 +4,7 @@
 #include <encode/encode.h>
 #include <models/scene_models.h>
 #include <pipeline/cook_warnings.h>
+#include <pipeline/door_warnings.h>
 #include <pipeline/level_meshes.h>
 #include <pipeline/model_meshes.h>
 
@@ -42,48 +43,6 @@ std::vector<uint32_t> describeContributions(const Scene& scene, const Baked& bak
     return contribution_of_term;
 }
 
-void warnOfIdleElements(const Scene& scene, const Baked& baked, CookStats& stats) {
-    std::vector<bool> used(scene.doors.size()), faint(scene.doors.size());
-    constexpr const char* below =
-        "changes light by less than its activity threshold everywhere; it is kept, and does nothing. Lower "
-        "'records.threshold'";
-    for (uint32_t t = 0; t < baked.terms.size(); ++t) {
-        const Term& term = baked.terms[t];
-        const bool active = baked.reports[t].receivers > 0, arrives = baked.reports[t].energy > 0;
-        for (const auto* doors : {&term.doors_open, &term.doors_closed})
-            for (const uint32_t door : *doors) {
-                used[door] = used[door] || active;
-                faint[door] = faint[door] || arrives;
-            }
-        if (active || !term.free() || term.group == always_group) continue;
-        stats.warnings.push_back(fmt::format("{}: light set '{}' {}", scene.file, scene.light_sets[term.group - 1].name,
-                                             arrives ? below : "reaches no surface; it is kept, and does nothing"));
-    }
-    // What is lit through two doors alone is told with the pair.
-    for (const DoorPair& pair : baked.dependent_doors) used[pair.first] = used[pair.second] = true;
-    for (uint32_t d = 0; d < used.size(); ++d)
-        if (!used[d])
-            stats.warnings.push_back(fmt::format("{}: door '{}' {}", scene.file, scene.doors[d].name,
-                                                 faint[d] ? below : "changes no light; it is kept, and does nothing"));
-}
-
-void warnOfDependentDoors(const Scene& scene, const Baked& baked, CookStats& stats) {
-    for (const DoorPair& pair : baked.dependent_doors) {
-        const std::string first = "door:" + scene.doors[pair.first].name,
-                          second = "door:" + scene.doors[pair.second].name;
-        stats.suggested_combinations.emplace_back(first, second);
-        const std::string what =
-            std::isinf(pair.loss)
-                ? "light that only comes through both is missing while both are open"
-                : fmt::format("some {:.0f} % of the light that the lesser of them moves is off while both are open",
-                              100 * static_cast<double>(pair.loss));
-        stats.warnings.push_back(
-            fmt::format("{}: '{}' and '{}' depend on each other: {}; name [\"{}\", \"{}\"] in the scene's "
-                        "'dimmer_combinations' (--suggest-combinations prints the list)",
-                        scene.file, first, second, what, first, second));
-    }
-}
-
 void describePlaces(const Scene& scene, PackData& pack) {
     for (const SceneViewpoint& v : scene.viewpoints)
         pack.viewpoints.push_back({v.name,
@@ -103,8 +62,7 @@ PackData encodePack(const ChartedLevel& level, const Texels& texels, const Baked
     pack.page_count = level.charts.page_count;
     describeElements(scene, pack);
     const std::vector<uint32_t> contribution_of_term = describeContributions(scene, baked, pack);
-    warnOfIdleElements(scene, baked, stats);
-    warnOfDependentDoors(scene, baked, stats);
+    warnOfElements(scene, baked, stats);
     std::vector<float> max_weights;
     for (const Term& term : baked.terms)
         max_weights.push_back(term.group == always_group ? 1 : scene.light_sets[term.group - 1].max_weight);

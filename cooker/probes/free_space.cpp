@@ -1,6 +1,7 @@
 #include <probes/free_space.h>
 
 #include <bake/sampling.h>
+#include <probes/air_box.h>
 
 #include <algorithm>
 
@@ -67,7 +68,8 @@ bool chosenInTheOpen(const RayScene& rays, glm::vec3 point_m, float near_m, floa
 }
 
 std::vector<glm::vec3> openPlaces(const RayScene& rays, uint32_t count, uint32_t seed) {
-    const glm::vec3 low = rays.boundsMin(), size = rays.boundsMax() - low;
+    const Box air = airBox(rays);
+    const glm::vec3 low = air.min_m, size = air.max_m - low;
     std::vector<glm::vec3> places;
     for (uint32_t i = 0; places.size() < count && i < tries_per_place * count; ++i) {
         const glm::vec3 p = low + size * sequence3d(i, seed);

@@ -22,8 +22,8 @@ bool inTheOpen(const RayScene& rays, glm::vec3 point_m, uint32_t ignored = no_mo
 // farther away. `chance`: the place's own, 0 to 1.
 bool chosenInTheOpen(const RayScene& rays, glm::vec3 point_m, float near_m, float chance);
 
-// Random places in the open, evenly over the level's box; fewer where the level has hardly any. The same seed gives the
-// same places.
+// Random places in the open, evenly over the box of the level's air (probes/air_box.h); fewer where the level has
+// hardly any. The same seed gives the same places.
 std::vector<glm::vec3> openPlaces(const RayScene& rays, uint32_t count, uint32_t seed);
 
 }  // namespace dimmer::cook

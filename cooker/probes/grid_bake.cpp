@@ -168,7 +168,6 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
                              std::span<const Term> terms, const GridSettings& settings, Progress& progress) {
     BakedGrid out;
     out.free_volume_m3 = choice.free_volume_m3;
-    if (choice.blocks.empty()) return out;
     const std::vector<FitValue> states = statesOf(rays.scene(), light, terms, siteOrder(choice.blocks));
     auto placed = placeProbes(rays, choice, states, settings, progress);
     if (!placed) return std::unexpected(placed.error());

@@ -44,6 +44,7 @@ class Chooser {
    public:
     Chooser(const RayScene& rays, const GridSettings& settings, GroupStore* store)
         : rays_(rays), settings_(settings), store_(store) {
+        out_.air = airBox(rays);
         for (const PunctualLight& light : rays.scene().lights)
             if (light.type != LightType::Directional && light.bake != BakeMode::None &&
                 std::ranges::find(lamps_, light.position_m) == lamps_.end())
@@ -60,10 +61,11 @@ class Chooser {
         for (const glm::vec3 lamp : lamps_)
             if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
                 out_.blocks.push_back({around(lamp, count), rays});
-        if (std::ranges::all_of(out_.blocks, [](const SiteBlock& block) { return block.places_m.empty(); })) {
-            out_.blocks.clear();
-            return std::move(out_);
-        }
+        if (std::ranges::all_of(out_.blocks, [](const SiteBlock& block) { return block.places_m.empty(); }))
+            return std::unexpected(Error{
+                ErrorCode::BadInput,
+                "no place in the level's box, nor in its play areas, is in the open: where most of what is around is "
+                "the back of a surface, or one is within 5 cm, no probe can stand"});
         auto corners = freeCorners();
         if (!corners) return std::unexpected(corners.error());
         out_.blocks.push_back({std::move(*corners), rays});
@@ -78,7 +80,7 @@ class Chooser {
                 0, first_look, [&](uint32_t i) { return anywhere(i); },
                 [&](glm::vec3 p, uint32_t) { return inTheOpen(rays_, p); });
         });
-        const glm::dvec3 size = glm::dvec3(rays_.boundsMax()) - glm::dvec3(rays_.boundsMin());
+        const glm::dvec3 size = glm::dvec3(out_.air.max_m) - glm::dvec3(out_.air.min_m);
         out_.free_volume_m3 = static_cast<double>(free.size()) / first_look * size.x * size.y * size.z;
         // The box's corners are probes too.
         const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0),
@@ -96,7 +98,7 @@ class Chooser {
     }
 
     glm::vec3 anywhere(uint32_t i) const {
-        const glm::vec3 low = rays_.boundsMin(), size = rays_.boundsMax() - low;
+        const glm::vec3 low = out_.air.min_m, size = out_.air.max_m - low;
         return low + size * glm::vec3(radicalInverse(2, i + 1), radicalInverse(3, i + 1), radicalInverse(5, i + 1));
     }
     // Uniform in the distance, so that each shell around a lamp gets as many (but for what is far from surfaces): light
@@ -116,13 +118,16 @@ class Chooser {
     std::vector<glm::vec3> sites(const std::vector<float>& what, uint32_t count, auto&& at) const {
         return remembered(what, [&] {
             return first(count, at, [&](glm::vec3 p, uint32_t i) {
-                return chosenInTheOpen(rays_, p, near_m_, unitFloat(hash(i, rarity_seed)));
+                return p == glm::clamp(p, out_.air.min_m, out_.air.max_m) &&
+                       chosenInTheOpen(rays_, p, near_m_, unitFloat(hash(i, rarity_seed)));
             });
         });
     }
 
     // What an earlier cook found of the same. `what`: all that it depends on besides the level's geometry.
-    std::vector<glm::vec3> remembered(const std::vector<float>& what, auto&& find) const {
+    std::vector<glm::vec3> remembered(std::vector<float> what, auto&& find) const {
+        for (const glm::vec3 corner : {out_.air.min_m, out_.air.max_m})
+            what.insert(what.end(), {corner.x, corner.y, corner.z});
         if (store_)
             if (auto places = store_->findPlaces(what)) return std::move(*places);
         const std::vector<glm::vec3> places = find();
@@ -154,7 +159,7 @@ class Chooser {
     }
 
     Expected<std::vector<glm::vec3>> freeCorners() {
-        const auto box = tetrahedralise({}, {rays_.boundsMin(), rays_.boundsMax()});
+        const auto box = tetrahedralise({}, out_.air);
         if (!box) return std::unexpected(box.error());
         std::vector<glm::vec3> corners;
         for (const ProbePosition& p : box->positions) {

@@ -3,6 +3,7 @@
 
 #include <bake/light_grid.h>
 #include <bake/series.h>
+#include <probes/air_box.h>
 #include <probes/fit.h>
 
 #include <array>
@@ -14,8 +15,9 @@
 namespace dimmer::cook {
 
 struct SiteChoice {
+    Box air;  // probes/air_box.h: no place is outside of it
     // All over the level; around each lamp; the free ones of the corners of the grid's box. A block depends on
-    // geometry, its own lamp, how many there are and the settings alone. Empty: nothing is free.
+    // geometry, its own lamp, how many there are and the settings alone.
     std::vector<SiteBlock> blocks;
     std::vector<bool> corner_free;  // which of the box's 8 corners the last block has
     size_t probes_max = 0;          // as the settings and the level's size have it
@@ -32,7 +34,7 @@ struct SiteRow {
 };
 std::vector<SiteRow> siteOrder(std::span<const SiteBlock> blocks);
 
-// `store`: may be null.
+// `store`: may be null. ErrorCode::BadInput: nothing is free.
 Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings, GroupStore* store);
 
 // What is known of the light at the places, per group and block; the rest is to be traced.

@@ -33,6 +33,7 @@ TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<c
                      const GridSettings& settings)
     : rays_(rays),
       cells_(rays),
+      air_(choice.air),
       states_(states),
       settings_(settings),
       places_(choice.places()),
@@ -42,7 +43,7 @@ TrialGrid::TrialGrid(const RayScene& rays, const SiteChoice& choice, std::span<c
           std::clamp<size_t>(search_points_times_probes / choice.probes_max, search_points_min, visibility_points))) {
     auto corner = static_cast<uint32_t>(first_corner_);
     for (const bool is_free : choice.corner_free) corners_.push_back(is_free ? corner++ : no_index);
-    decideImportance();
+    decideImportance(siteOrder(choice.blocks));
 }
 
 // How wrong a probe's place would be without it, by what its neighbours in sight have, times what it stands for.
@@ -83,12 +84,21 @@ std::vector<std::pair<uint32_t, uint32_t>> TrialGrid::edges() const {
 
 // Between absolute errors and shares of the light that is there: least squares of shares would have lamps' light
 // too dark, as too bright costs more.
-void TrialGrid::decideImportance() {
+void TrialGrid::decideImportance(std::span<const SiteRow> order) {
     // From the first coefficient to the mean irradiance: sqrt(pi) / 2.
     const float to_lux = std::sqrt(pi) / 2;
-    double sum = 0;
-    for (size_t i = 0; i < first_corner_; ++i) sum += static_cast<double>(to_lux * states_[i][0]);
-    const auto mean = static_cast<float>(sum / static_cast<double>(first_corner_));
+    const auto meanOf = [&](auto&& counts) {
+        double sum = 0;
+        size_t places = 0;
+        for (size_t i = 0; i < first_corner_; ++i)
+            if (counts(order[i])) sum += static_cast<double>(to_lux * states_[i][0]), ++places;
+        return places == 0 ? 0.0f : static_cast<float>(sum / static_cast<double>(places));
+    };
+    // Half of the places are around lamps, and those of a lamp whose direct light is baked up to thousands of times as
+    // bright as the level: they count for no more than that again.
+    const float all_over = meanOf([](const SiteRow& r) { return r.block == 0; });
+    float mean = meanOf([](const SiteRow&) { return true; });
+    if (all_over > 0) mean = std::min(mean, 2 * all_over);
     floor_lux_ = std::max(mean * floor_of_mean, 1e-12f);
     for (const FitValue& state : states_) {
         const float lux = to_lux * state[0] + importance_floor * mean + 1e-12f;
@@ -104,7 +114,7 @@ Expected<void> TrialGrid::build(const ChosenProbes& probes, size_t places) {
         points.push_back(places_[i]);
         is_probe_[i] = true;
     }
-    auto grid = tetrahedralise(points, {rays_.boundsMin(), rays_.boundsMax()});
+    auto grid = tetrahedralise(points, air_);
     if (!grid) return std::unexpected(grid.error());
     result_.placement.grid = std::move(*grid);
     std::ranges::copy(probes_.levels, result_.placement.grid.levels.begin());

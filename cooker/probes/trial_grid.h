@@ -45,7 +45,7 @@ class TrialGrid {
 
    private:
     using Key = std::array<uint32_t, 4>;
-    void decideImportance();
+    void decideImportance(std::span<const SiteRow> order);  // of the places
     uint32_t placeOf(uint32_t position) const;
     bool isFree(uint32_t position) const;
     void findPlaces();
@@ -61,6 +61,7 @@ class TrialGrid {
 
     const RayScene& rays_;
     const TriangleCells cells_;
+    const Box air_;
     std::span<const FitValue> states_;  // per place
     const GridSettings& settings_;
     std::vector<glm::vec3> places_;  // and behind them the free corners of the box

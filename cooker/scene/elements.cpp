@@ -9,6 +9,7 @@ namespace dimmer::cook {
 
 // Of one combination: each may be open, closed or either, so that a light group has 3^8 = 6561 paths of them.
 constexpr std::ptrdiff_t combined_doors_max = 8;
+constexpr double rotation_length_max = 2;  // of a quaternion that was written by hand, as 0 1 0 1
 
 Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
     const auto name = extras.text("dimmer_light_set");
@@ -71,10 +72,14 @@ Expected<glm::dmat4> Elements::openPose(const Extras& extras, const std::string&
         if (!(glm::length(quaternion) > 1e-6))
             return context_.error(owner,
                                   "'dimmer_door_rotation' must be a quaternion x, y, z, w of length 1. Correct it.");
+        if (glm::length(quaternion) > rotation_length_max)
+            context_.warn(owner,
+                          "'dimmer_door_rotation' is a quaternion x, y, z, w, of which the direction counts; its "
+                          "numbers are larger than 1. If they are degrees, convert them.");
         pose = glm::mat4_cast(glm::normalize(quaternion));
     }
     if (*translation) pose[3] = {(**translation)[0], (**translation)[1], (**translation)[2], 1};
-    if (*rotation || *translation) doors_[index].pose_owner = owner;
+    if (pose != glm::dmat4(1)) doors_[index].pose_owner = owner;
     return pose;
 }
 
@@ -94,8 +99,8 @@ Expected<void> Elements::checkDoors() const {
         if (doors_[i].pose_owner.empty() && context_.scene.doors[i].pose)
             context_.warn(
                 doors_[i].owner,
-                fmt::format("the door '{}' opens by a pose, but states none: opening it changes nothing. Give "
-                            "it 'dimmer_door_rotation' or 'dimmer_door_translation'.",
+                fmt::format("the door '{}' opens by a pose, but states none that moves it: opening it changes nothing. "
+                            "Give it 'dimmer_door_rotation' or 'dimmer_door_translation'.",
                             name));
     }
     return {};

@@ -9,6 +9,7 @@
 
 #include <functional>
 #include <map>
+#include <numbers>
 #include <set>
 #include <span>
 
@@ -146,6 +147,92 @@ TEST(WallCuts, WallsPartRoomsHoweverTheyStand) {
         ASSERT_TRUE(charts.has_value());
         expectRoomsApart(rays, *charts);
     }
+}
+
+// Whatever the angle to the floor's own axes; the walls of the room, which it meets at that angle too, are parted as
+// well. 8 cm behind one at 30 degrees there were 73 of 285 lux.
+TEST(WallCuts, WallsAtAnAnglePartRooms) {
+    for (const float degrees : {3.0f, 30.0f, 45.0f}) {
+        SCOPED_TRACE(degrees);
+        const glm::mat3 turned(glm::rotate(glm::mat4(1), glm::radians(degrees), {0, 1, 0}));
+        Scene scene;
+        const uint32_t white = addMaterial(scene, lambert(0.5f));
+        addSolid(scene, "floor", {0, -0.1f, 0}, {4, 0.1f, 1.5f}, white);
+        addSolid(scene, "ceiling", {0, 2.8f, 0}, {4, 0.1f, 1.5f}, white);
+        for (const float side : {-1.0f, 1.0f})
+            addQuad(scene, "side", {0, 1.35f, side * 1.5f}, {0, 1.35f, 0}, {side * 4, 0, 0}, white);
+        ASSERT_LT(scene.meshes.back().normals[0].z, -0.9f);  // at z = 1.5
+        const size_t first = scene.meshes.size();
+        addSolid(scene, "wall", {0, 1.35f, 0}, {0.05f, 1.35f, 4}, white);
+        for (SceneMesh& mesh : std::span(scene.meshes).subspan(first)) {
+            for (glm::vec3& p : mesh.positions_m) p = turned * p;
+            for (glm::vec3& n : mesh.normals) n = turned * n;
+        }
+        cutAtWalls(scene, 4);
+        for (const SceneMesh& mesh : std::span(scene.meshes).first(first)) {
+            const bool in_room = mesh.node == "side" || (mesh.node == "floor" && mesh.normals[0].y > 0.5f) ||
+                                 (mesh.node == "ceiling" && mesh.normals[0].y < -0.5f);
+            if (!in_room) continue;
+            SCOPED_TRACE(mesh.node);
+            ASSERT_EQ(mesh.triangle_regions.size(), mesh.triangles.size());
+            std::map<uint32_t, std::pair<float, float>> reach;  // across the wall
+            for (size_t t = 0; t < mesh.triangles.size(); ++t)
+                for (int i = 0; i < 3; ++i) {
+                    const float x = (glm::transpose(turned) * mesh.positions_m[mesh.triangles[t][i]]).x;
+                    auto& [low, high] = reach.try_emplace(mesh.triangle_regions[t], x, x).first->second;
+                    low = std::min(low, x), high = std::max(high, x);
+                }
+            EXPECT_EQ(reach.size(), 2u);
+            for (const auto& [region, of] : reach) EXPECT_FALSE(of.first < -0.05f && of.second > 0.05f) << region;
+        }
+    }
+}
+
+// Stretches of a round wall are short, one by one: 0.26 m here, one texel. Outside it is one part, or the rectangles of
+// what lies around it would fill the page.
+TEST(WallCuts, ARoundTowerPartsTheGround) {
+    constexpr int sides = 24;
+    constexpr float inner_m = 1, outer_m = 1.2f;
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "ground", {0, 0, 0}, {0, 0, 8}, {8, 0, 0}, white);
+    const auto corner = [](float radius_m, int i) {
+        const float turn = 2 * std::numbers::pi_v<float> * static_cast<float>(i) / sides;
+        return radius_m * glm::vec3(std::cos(turn), 0, std::sin(turn));
+    };
+    for (int i = 0; i < sides; ++i) {
+        const auto side = [&](float radius_m, float front) {
+            const glm::vec3 a = corner(radius_m, i), b = corner(radius_m, i + 1);
+            addQuad(scene, "tower", 0.5f * (a + b) + glm::vec3(0, 1.5f, 0), {0, 1.5f, 0}, front * 0.5f * (b - a),
+                    white);
+        };
+        side(inner_m, -1), side(outer_m, 1);
+    }
+    ASSERT_GT(scene.meshes[2].normals[0].x, 0.9f);   // outer side
+    ASSERT_LT(scene.meshes[1].normals[0].x, -0.9f);  // inner side
+    cutAtWalls(scene, 4);
+    const SceneMesh& ground = scene.meshes[0];
+    ASSERT_FALSE(ground.triangle_regions.empty());
+    std::set<uint32_t> inside, outside;
+    for (size_t t = 0; t < ground.triangles.size(); ++t) {
+        glm::vec3 middle(0);
+        for (int i = 0; i < 3; ++i) middle += ground.positions_m[ground.triangles[t][i]] / 3.0f;
+        (glm::length(middle) < 0.5f * (inner_m + outer_m) ? inside : outside).insert(ground.triangle_regions[t]);
+    }
+    EXPECT_EQ(inside.size(), 1u);
+    EXPECT_EQ(outside.size(), 1u);
+    EXPECT_NE(inside, outside);
+}
+
+// What is larger than a page has larger texels, and walls that are thick for smaller ones are thin.
+TEST(WallCuts, AThickWallPartsAGroundThatIsStoredCoarsely) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addQuad(scene, "ground", {0, 0, 0}, {0, 0, 20}, {50, 0, 0}, white);
+    addSolid(scene, "wall", {0, 1.5f, 0}, {0.6f, 1.5f, 20}, white);
+    cutAtWalls(scene, 4, 128);
+    const SceneMesh& ground = scene.meshes[0];
+    EXPECT_EQ(std::set<uint32_t>(ground.triangle_regions.begin(), ground.triangle_regions.end()).size(), 2u);
 }
 
 // A leaf that fills a corridor hangs over its floor, and parts it.

@@ -8,9 +8,9 @@
 namespace dimmer::cook {
 namespace {
 
-using test::pick;
-using test::Random;
-using test::uniform;
+using dimmer::test::pick;
+using dimmer::test::Random;
+using dimmer::test::uniform;
 
 std::vector<FitSite> randomSites(Random& random, uint32_t probes, uint32_t count) {
     std::vector<FitSite> sites(count);

@@ -396,6 +396,27 @@ TEST(SceneElements, CombinationsThatDoNothingAreSaidTo) {
     EXPECT_TRUE(scene->warnings.empty());
 }
 
+// Reset by an editor, or written in degrees: neither opens the door as meant.
+TEST(SceneElements, APoseThatIsNoneIsTold) {
+    LevelFile level = levelWithLamp({});
+    const int node = level.addNode(
+        {{"name", "leaf"},
+         {"mesh", level.addSquareMesh(0)},
+         {"extras", {{"dimmer_door", "front"}, {"dimmer_door_open", "pose"}, {"dimmer_door_rotation", {0, 0, 0, 1}}}}});
+    auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'leaf'", "'front'", "states none that moves it", "dimmer_door_translation"});
+    level.node(node)["extras"]["dimmer_door_rotation"] = {0, 90, 0, 0};
+    scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 1u);
+    expectWarning(*scene, {"node 'leaf'", "dimmer_door_rotation", "degrees"});
+    level.node(node)["extras"]["dimmer_door_rotation"] = {0, 1, 0, 1};
+    scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_TRUE(scene->warnings.empty());
+}
+
 // A leaf that is turned below an uneven scale has axes that are not at right angles: its pose is no turn.
 TEST(SceneElements, APoseBelowAnUnevenScaleIsRefused) {
     LevelFile level = LevelFile::withFloor();
