@@ -5,6 +5,7 @@
 #include <app/terminal_progress.h>
 #include <pipeline/heat_map.h>
 #include <pipeline/level_files.h>
+#include <pipeline/level_meshes.h>
 #include <pipeline/profile.h>
 #include <pipeline/verify.h>
 #include <write/pack_writer.h>
@@ -167,6 +168,11 @@ int run(VerifyArguments a) {
     if (!scene) return reportError(scene.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
+    if (const std::string node = nodeThatDiffers(*scene, pack->meshes()); !node.empty())
+        sayMessage(
+            fmt::format("warning: {}: its node '{}' is not where {} has it, or is not there: the pack is of "
+                        "another level, or the level was changed since; the figures hold one against the other",
+                        a.level, node, a.pack));
     TerminalProgress progress;
     a.options.sets = !a.no_sets;
     const auto report = verify(*scene, *pack, a.options, progress);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 
 namespace dimmer::cook {
 namespace {
@@ -15,6 +16,9 @@ namespace {
 // smaller is one texel and a ring of padding eight times as large.
 constexpr size_t few_charts = 32;
 constexpr float small_chart_m2 = 0.04f;
+// What is in the same or in neighbouring cells is one thing; what takes more of them is none that 64 probes stand for.
+constexpr float cell_m = 0.5f;
+constexpr size_t cells_max = 100'000;
 // No grid is thinner: probes on both sides of a sheet stand apart.
 constexpr float thickness_min_m = 0.1f;
 // Axes whose cosine is larger are sheared.
@@ -36,6 +40,37 @@ bool fallsApart(const Scene& scene, const SceneMesh& mesh) {
     }
     const size_t charts = planarCharts(faces, UINT16_MAX).size();
     return charts > few_charts && area_m2 < small_chart_m2 * static_cast<float>(charts);
+}
+
+// Whether nothing of a mesh is more than a metre from the rest. Things that a tool has merged stand in different rooms,
+// and one grid over them would carry the light of the one into the other.
+bool hangsTogether(const SceneMesh& mesh) {
+    using Cell = std::array<int, 3>;
+    std::set<Cell> cells;
+    for (const glm::uvec3& t : mesh.triangles) {
+        const glm::vec3 a = mesh.positions_m[t.x], b = mesh.positions_m[t.y], c = mesh.positions_m[t.z];
+        const glm::ivec3 low(glm::floor(glm::min(glm::min(a, b), c) / cell_m)),
+            high(glm::floor(glm::max(glm::max(a, b), c) / cell_m));
+        const glm::dvec3 count = glm::dvec3(high) - glm::dvec3(low) + 1.0;
+        if (cells.size() > cells_max || count.x * count.y * count.z > cells_max) return false;
+        for (int x = low.x; x <= high.x; ++x)
+            for (int y = low.y; y <= high.y; ++y)
+                for (int z = low.z; z <= high.z; ++z) cells.insert({x, y, z});
+    }
+    std::vector<Cell> open = {*cells.begin()};
+    cells.erase(cells.begin());
+    while (!open.empty()) {
+        const Cell at = open.back();
+        open.pop_back();
+        for (int neighbour = 0; neighbour < 27; ++neighbour) {
+            const auto found =
+                cells.find({at[0] + neighbour % 3 - 1, at[1] + neighbour / 3 % 3 - 1, at[2] + neighbour / 9 - 1});
+            if (found == cells.end()) continue;
+            open.push_back(*found);
+            cells.erase(found);
+        }
+    }
+    return cells.empty();
 }
 
 // How a node lies in the world, taken apart.
@@ -108,7 +143,8 @@ glm::vec3 stepOf(const SceneModel& model, int axis) {
 void chooseLighting(Scene& scene) {
     for (SceneMesh& mesh : scene.meshes) {
         if (mesh.lighting != Lighting::Automatic) continue;
-        const bool grid = !mesh.door && !mesh.light_set && mesh.uv1.empty() && fallsApart(scene, mesh);
+        const bool grid =
+            !mesh.door && !mesh.light_set && mesh.uv1.empty() && fallsApart(scene, mesh) && hangsTogether(mesh);
         mesh.lighting = grid ? Lighting::LocalGrid : Lighting::Lightmap;
     }
 }

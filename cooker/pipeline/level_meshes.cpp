@@ -1,5 +1,7 @@
 #include <pipeline/level_meshes.h>
 
+#include <limits>
+#include <map>
 #include <tuple>
 
 namespace dimmer::cook {
@@ -71,6 +73,30 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::s
     std::vector<Mesh> meshes;
     for (auto& [key, builder] : builders) meshes.push_back(std::move(builder.mesh));
     return meshes;
+}
+
+std::string nodeThatDiffers(const Scene& scene, std::span<const Mesh> of_pack) {
+    constexpr float same_m = 1e-3f;  // pieces of cut faces end within a rounding step
+    struct Box {
+        glm::vec3 min_m{std::numeric_limits<float>::max()}, max_m{std::numeric_limits<float>::lowest()};
+        void add(glm::vec3 p) { min_m = glm::min(min_m, p), max_m = glm::max(max_m, p); }
+    };
+    std::map<std::string, Box> of_level, of_nodes;
+    for (const SceneMesh& mesh : scene.meshes)
+        for (const glm::uvec3& triangle : mesh.triangles)
+            for (int i = 0; i < 3 && !mesh.is_open_leaf; ++i) of_level[mesh.node].add(mesh.positions_m[triangle[i]]);
+    for (const Mesh& mesh : of_pack)
+        for (const MeshVertex& v : mesh.vertices)
+            of_nodes[mesh.node].add({v.position_m[0], v.position_m[1], v.position_m[2]});
+    for (const auto& [node, box] : of_nodes) {
+        const auto found = of_level.find(node);
+        if (found == of_level.end()) return node;
+        // Surfaces that are not lit are in no pack: its box may be smaller.
+        const bool inside = glm::all(glm::greaterThanEqual(box.min_m, found->second.min_m - same_m)) &&
+                            glm::all(glm::lessThanEqual(box.max_m, found->second.max_m + same_m));
+        if (!inside) return node;
+    }
+    return {};
 }
 
 }  // namespace dimmer::cook

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <map>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace dimmer::cook {
@@ -26,5 +27,9 @@ class MeanReflectances {
 // `emission_cd_m2`: per material, in the place of the scene's own; empty: those.
 std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap,
                               std::span<const glm::vec3> emission_cd_m2 = {});
+
+// The first node of a pack's meshes that the level lacks, or has with another box: the pack is of another level, or of
+// an earlier state. Empty: none.
+std::string nodeThatDiffers(const Scene& scene, std::span<const Mesh> of_pack);
 
 }  // namespace dimmer::cook

@@ -375,7 +375,8 @@ class LevelImporter {
         const auto dynamic = lighting(extras, owner);
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};
-        if (at.singular == -1) scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
+        if (at.singular != -1) return singular(at, owner);
+        scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
         return {};
     }
 

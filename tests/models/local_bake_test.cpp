@@ -242,5 +242,28 @@ TEST(SceneModels, WhatFallsApartIntoSmallChartsGetsAGridUnlessTheLevelSaysOtherw
     for (size_t m = 1; m < scene.meshes.size(); ++m) EXPECT_EQ(scene.meshes[m].lighting, Lighting::Lightmap) << m;
 }
 
+// A grid over pebbles of two rooms, merged by a tool, lit the dark room's with 4 lux of the other's lamp.
+TEST(SceneModels, WhatLiesApartIsManyThings) {
+    for (const float apart_m : {0.7f, 3.0f}) {
+        Scene scene;
+        addSphere(scene, 0.3f, 24, 12, addMaterial(scene, lambert(0.5f)));
+        SceneMesh& mesh = scene.meshes[0];
+        mesh.uv1.clear();
+        mesh.lighting = Lighting::Automatic;
+        const auto vertices = static_cast<uint32_t>(mesh.positions_m.size());
+        const size_t triangles = mesh.triangles.size();
+        for (uint32_t v = 0; v < vertices; ++v) {
+            mesh.positions_m.push_back(mesh.positions_m[v] + glm::vec3(apart_m, 0, 0));
+            mesh.normals.push_back(mesh.normals[v]);
+        }
+        for (size_t t = 0; t < triangles; ++t) {
+            mesh.triangles.push_back(mesh.triangles[t] + vertices);
+            mesh.triangle_materials.push_back(mesh.triangle_materials[t]);
+        }
+        chooseLighting(scene);
+        EXPECT_EQ(mesh.lighting, apart_m < 1 ? Lighting::LocalGrid : Lighting::Lightmap) << apart_m;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

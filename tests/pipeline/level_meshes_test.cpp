@@ -183,5 +183,17 @@ TEST(LevelMeshes, VerticesAreShared) {
     EXPECT_EQ(result.meshes[0].indices.size(), 6u);
 }
 
+// Held against a level that it is not of, a pack is told to be of another one.
+TEST(LevelMeshes, ThoseOfAnotherLevelAreTold) {
+    LevelFile level = twoCells();
+    const std::vector<Mesh> meshes = build(level).meshes;
+    EXPECT_EQ(nodeThatDiffers(*level.import(), meshes), "");
+    level.node(0)["translation"] = {0.1, 0, 0};
+    EXPECT_EQ(nodeThatDiffers(*level.import(), meshes), level.node(0)["name"]);
+    level = twoCells();
+    level.node(0)["name"] = "renamed";
+    EXPECT_EQ(nodeThatDiffers(*level.import(), meshes), twoCells().node(0)["name"]);
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

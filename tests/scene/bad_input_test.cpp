@@ -374,6 +374,10 @@ TEST(SceneBadInput, Transforms) {
     ASSERT_IMPORTED(above.import());  // nothing stands below it
     above.addNode({{"name", "crate"}, {"mesh", 0}}, flat);
     expectBadInput(above.import(), {"node 'crate'", "node 'flat'", "singular"});
+    // A place for what moves has no mesh, and vanished.
+    LevelFile place = LevelFile::withFloor();
+    place.addNode({{"name", "spawn"}, {"scale", {0, 0, 0}}, {"extras", {{"dimmer_dynamic", true}}}});
+    expectBadInput(place.import(), {"node 'spawn'", "singular"});
 }
 
 TEST(SceneBadInput, RequiredExtensionsMustBeKnown) {
