@@ -39,6 +39,13 @@ inline float polygonArea(const Polygon& p) {
     return std::abs(signedArea(p));
 }
 
+// Of the same area and outline, were it long: 0 for what rounding leaves of a cut along an edge.
+inline float polygonWidth(const Polygon& p) {
+    float around = 0;
+    for (size_t i = 0; i < p.size(); ++i) around += glm::length(p[(i + 1) % p.size()] - p[i]);
+    return around > 0 ? 2 * polygonArea(p) / around : 0;
+}
+
 // The part on one side of the line of points p with normal . p = at: beyond it (sign 1) or before it (-1). `normal` is
 // a unit vector.
 inline Polygon clipped(const Polygon& polygon, glm::vec2 normal, float at, float sign) {

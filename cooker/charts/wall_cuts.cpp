@@ -75,7 +75,8 @@ class WallCutter {
             std::map<uint32_t, uint32_t> parts_of;  // per face
             for (const auto& part : parts) {
                 std::set<uint32_t> faces;
-                for (const Piece& piece : part) faces.insert(piece.face);
+                for (const Piece& piece : part)
+                    if (polygonWidth(piece.corners) > wall_margin_m) faces.insert(piece.face);
                 for (const uint32_t face : faces)
                     if (++parts_of[face] > 1) scene_.meshes[sources_[face].mesh].uv1_crosses_walls = true;
             }

@@ -3,6 +3,7 @@
 #include <charts/groups.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>

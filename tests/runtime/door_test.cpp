@@ -19,6 +19,9 @@ TEST(DoorWeight, HingedFollowsWhatTheLeafUncovers) {
     EXPECT_EQ(hingedDoorWeight(3, pi / 2), 1);
     EXPECT_EQ(hingedDoorWeight(0.1f, 0), 1);
     EXPECT_EQ(hingedDoorWeight(0, 0), 0);
+    // A leaf hinged on the other side jumped open.
+    EXPECT_FLOAT_EQ(hingedDoorWeight(-pi / 3, -pi / 2), 0.5f);
+    EXPECT_FLOAT_EQ(hingedDoorWeight(pi / 3, -pi / 2), 0.5f);
 }
 
 // Against the cosines in double, whose own cancellation is 1e-16 of 1 - cos 0.01 = 5e-5: nothing beside a float's.
@@ -50,6 +53,9 @@ TEST(DoorWeight, SlidingIsTravelOverWidth) {
     EXPECT_FLOAT_EQ(slidingDoorWeight(0.2f, 0.8f), 0.25f);
     EXPECT_EQ(slidingDoorWeight(1, 0.8f), 1);
     EXPECT_EQ(slidingDoorWeight(0.1f, 0), 1);
+    EXPECT_FLOAT_EQ(slidingDoorWeight(-0.2f, -0.8f), 0.25f);
+    EXPECT_EQ(slidingDoorWeight(0.2f, -0.8f), 0);
+    EXPECT_FALSE(std::signbit(slidingDoorWeight(0, -0.8f)));
     EXPECT_TRUE(std::isnan(slidingDoorWeight(NAN, 0.8f)));
     EXPECT_TRUE(std::isnan(slidingDoorWeight(0.2f, NAN)));
 }
