@@ -8,7 +8,6 @@
 #include <cmath>
 #include <functional>
 #include <limits>
-#include <numeric>
 #include <tuple>
 #include <utility>
 
@@ -25,13 +24,11 @@ constexpr float same_slope = 1e-3f;
 // Directions of what stands on one chart are looked for so far: those of a tower of 256 sides.
 constexpr size_t turns_max = 64;
 constexpr float facet_min_texels = 0.25f;  // shorter ones have no direction of their own
-constexpr float rows_gap_texels = 1.1f,
-                row_cos = 0.7f;   // of a round wall of eight sides, as thick as the filter reaches
-constexpr float skins_per_m = 1;  // places at which is looked what is behind a skin, within limits
+constexpr float skins_per_m = 1;           // places at which is looked what is behind a skin, within limits
 constexpr int skins_min = 3, skins_max = 16;
-constexpr float thick_m = 1;       // of solids: farther behind a face, a back is another wall's
-constexpr float gap_m = 0.25f;     // between skins that is no room
-constexpr float first_step_m = 1;  // of a ray; twice as far each time
+constexpr float thick_m = 1;         // of solids: farther behind a face, a back is another wall's
+constexpr float room_min_m = 0.25f;  // between skins: less is no room
+constexpr float first_step_m = 1;    // of a ray; twice as far each time
 
 float largest(glm::vec3 p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -56,49 +53,6 @@ std::vector<WallLine> joined(std::vector<WallLine> lines) {
         same->to = std::max(same->to, l.to);
     }
     return joined;
-}
-
-struct LineEnd {
-    glm::vec2 at, outwards;
-    uint32_t line;
-};
-
-// A round wall is a row of stretches whose lines have no more than an eighth of a turn from one to the next.
-void addRows(WallLines& walls, float reach_m) {
-    std::vector<LineEnd> ends;
-    std::vector<BoxTree::Box> boxes;
-    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
-        const WallLine& l = walls.lines[i];
-        const Turn& turn = walls.turns[l.turn];
-        const glm::vec2 along = turn.axis(1 - l.axis), on_line = l.at * turn.axis(l.axis);
-        for (const float sign : {-1.0f, 1.0f}) {
-            const glm::vec2 at = on_line + (sign < 0 ? l.from : l.to) * along;
-            ends.push_back({at, sign * along, i});
-            boxes.push_back({{at - reach_m, 0}, {at + reach_m, 0}});
-        }
-    }
-    std::vector<uint32_t> row(walls.lines.size());
-    std::iota(row.begin(), row.end(), 0u);
-    const auto find = [&](uint32_t i) {
-        while (row[i] != i) i = row[i] = row[row[i]];
-        return i;
-    };
-    const BoxTree tree(std::move(boxes));
-    for (const LineEnd& a : ends)
-        for (const uint32_t other : tree.touching({{a.at, 0}, {a.at, 0}})) {
-            const LineEnd& b = ends[other];
-            if (walls.lines[a.line].turn == walls.lines[b.line].turn || -glm::dot(a.outwards, b.outwards) < row_cos)
-                continue;
-            row[find(a.line)] = find(b.line);
-        }
-    std::vector<float> row_m(walls.lines.size(), 0);
-    std::vector<uint32_t> row_lines(walls.lines.size(), 0);
-    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
-        row_m[find(i)] += walls.lines[i].to - walls.lines[i].from;
-        ++row_lines[find(i)];
-    }
-    for (uint32_t i = 0; i < walls.lines.size(); ++i)
-        if (row_lines[find(i)] > 1) walls.lines[i].row_m = row_m[find(i)];
 }
 
 glm::vec2 flat(const PlanarChart& chart, glm::vec3 p) {
@@ -135,7 +89,6 @@ WallLines StandingWalls::on(const PlanarChart& chart, float coarsest_texels_per_
             line.turn = t;
             found.lines.push_back(line);
         }
-    addRows(found, rows_gap_texels / chart.texels_per_metre);
     return found;
 }
 
@@ -397,7 +350,7 @@ bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
         if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) continue;
         const glm::vec3 from = on_line + beside + wall_probe_low_m * up;
         const Met next = meets(from, behind);
-        const bool open = next.at_m > (next.is_back ? thick_m : gap_m);
+        const bool open = next.at_m > (next.is_back ? thick_m : room_min_m);
         if (open && !meets(from, along).is_back && !meets(from, -along).is_back && !meets(from, up).is_back)
             return true;
     }

@@ -24,7 +24,6 @@ struct WallLine {
     int axis = 0;
     float at = 0, from = 0, to = 0;
     uint32_t turn = 0;  // whose axes
-    float row_m = 0;    // of a round wall: all stretches of its row
 };
 
 struct WallLines {

@@ -17,6 +17,50 @@ namespace {
 
 constexpr float length_min_texels = 3;   // of all stretches between doorways; a table's leg is no wall
 constexpr float wall_share_min = 0.25f;  // of a wall with its doorways
+// From one stretch of a round wall to the next: of eight sides, as thick as the filter reaches.
+constexpr float rows_gap_texels = 1.1f, row_cos = 0.7f;
+
+// All stretches of the row that one is of.
+struct RowLine : WallLine {
+    float row_m = 0;  // of one that stands alone, 0
+};
+
+// A round wall is a row of stretches whose lines have no more than an eighth of a turn from one to the next.
+std::vector<RowLine> withRows(const WallLines& walls, float gap_m) {
+    struct End {
+        glm::vec2 at, outwards;
+        uint32_t line;
+    };
+    std::vector<End> ends;
+    std::vector<BoxTree::Box> boxes;
+    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
+        const WallLine& l = walls.lines[i];
+        const Turn& turn = walls.turns[l.turn];
+        const glm::vec2 along = turn.axis(1 - l.axis), on_line = l.at * turn.axis(l.axis);
+        for (const float sign : {-1.0f, 1.0f}) {
+            const glm::vec2 at = on_line + (sign < 0 ? l.from : l.to) * along;
+            ends.push_back({at, sign * along, i});
+            boxes.push_back({{at - gap_m, 0}, {at + gap_m, 0}});
+        }
+    }
+    Groups rows(walls.lines.size());
+    const BoxTree tree(std::move(boxes));
+    for (const End& end : ends)
+        for (const uint32_t other : tree.touching({{end.at, 0}, {end.at, 0}})) {
+            const bool one_turn = walls.lines[end.line].turn == walls.lines[ends[other].line].turn;
+            if (one_turn || -glm::dot(end.outwards, ends[other].outwards) < row_cos) continue;
+            const uint32_t a = rows.find(end.line), b = rows.find(ends[other].line);
+            if (a != b) rows.join(a, b);
+        }
+    std::vector<float> row_m(walls.lines.size());
+    for (uint32_t i = 0; i < walls.lines.size(); ++i) row_m[rows.find(i)] += walls.lines[i].to - walls.lines[i].from;
+    std::vector<RowLine> lines;
+    for (uint32_t i = 0; i < walls.lines.size(); ++i) {
+        const float own_m = walls.lines[i].to - walls.lines[i].from, all_m = row_m[rows.find(i)];
+        lines.push_back({walls.lines[i], all_m > own_m ? all_m : 0});
+    }
+    return lines;
+}
 
 struct Stretch {
     float from, to;
@@ -39,13 +83,15 @@ std::vector<Stretch> united(std::vector<Stretch> stretches) {
 class WallSplitter {
    public:
     WallSplitter(const WallLines& walls, float texels_per_metre)
-        : walls_(walls), needed_m_(length_min_texels / texels_per_metre) {}
+        : walls_(walls),
+          lines_(withRows(walls, rows_gap_texels / texels_per_metre)),
+          needed_m_(length_min_texels / texels_per_metre) {}
 
     // The longest wall first; the others go on in the halves that they stand in. No recursion: a row of equal walls is
     // as deep as it is long.
     void split(std::vector<Piece> pieces) {
         std::vector<Part> open;
-        open.push_back(partOf(std::move(pieces), walls_.lines, {}));
+        open.push_back(partOf(std::move(pieces), lines_, {}));
         while (!open.empty()) {
             Part part = std::move(open.back());
             open.pop_back();
@@ -97,18 +143,18 @@ class WallSplitter {
     // What is left of a chart beside the walls so far, and the walls that may stand on it.
     struct Part {
         std::vector<Piece> pieces;
-        std::vector<WallLine> cuts;     // those on lines through its rectangles, all of each line
+        std::vector<RowLine> cuts;      // those on lines through its rectangles, all of each line
         std::vector<Rect> rects;        // along the axes of each turn
         std::vector<uint32_t> borders;  // of cuts_, those along which it ends
     };
 
-    Part partOf(std::vector<Piece> pieces, const std::vector<WallLine>& cuts,
+    Part partOf(std::vector<Piece> pieces, const std::vector<RowLine>& cuts,
                 const std::vector<uint32_t>& borders) const {
         Part part{std::move(pieces), {}, std::vector<Rect>(walls_.turns.size()), {}};
         for (size_t t = 0; t < walls_.turns.size(); ++t)
             for (const Piece& piece : part.pieces)
                 for (const glm::vec2 corner : piece.corners) part.rects[t].add(walls_.turns[t].on(corner));
-        std::ranges::copy_if(cuts, std::back_inserter(part.cuts), [&](const WallLine& c) {
+        std::ranges::copy_if(cuts, std::back_inserter(part.cuts), [&](const RowLine& c) {
             return c.at >= part.rects[c.turn].min[c.axis] && c.at <= part.rects[c.turn].max[c.axis];
         });
         std::ranges::copy_if(borders, std::back_inserter(part.borders),
@@ -120,7 +166,7 @@ class WallSplitter {
     glm::vec2 alongOf(const WallLine& wall) const { return walls_.turns[wall.turn].axis(1 - wall.axis); }
 
     // Those on the line of one; lines ascend as StandingWalls has them.
-    static std::span<const WallLine> onLineOf(const WallLine& wall, std::span<const WallLine> lines) {
+    static std::span<const RowLine> onLineOf(const WallLine& wall, std::span<const RowLine> lines) {
         const auto place = [](const WallLine& c) { return std::tuple(c.turn, c.axis, c.at); };
         const float reach_m = same_line_m + slackAt(wall.at);
         const auto first =
@@ -133,7 +179,7 @@ class WallSplitter {
 
     // Between two ends, with what goes on beyond doorways: at a few texels per metre no stretch between them is long. A
     // row of pillars, most of which is gap, is none.
-    static float wallLength(const WallLine& cut, std::span<const WallLine> cuts, float low, float high) {
+    static float wallLength(const WallLine& cut, std::span<const RowLine> cuts, float low, float high) {
         float whole = 0, first = high, last = low;
         for (const WallLine& other : onLineOf(cut, cuts)) {
             const float from = std::max(other.from, low), to = std::min(other.to, high);
@@ -148,7 +194,7 @@ class WallSplitter {
     std::optional<WallLine> longestWall(const Part& part) const {
         std::optional<WallLine> best;
         float best_length = 0;
-        for (const WallLine& c : part.cuts) {
+        for (const RowLine& c : part.cuts) {
             const auto& [low, high] = part.rects[c.turn];
             const float largest = std::max({-low.x, -low.y, high.x, high.y});
             const float margin = std::max(wall_margin_m, rounding_share * largest);
@@ -238,13 +284,14 @@ class WallSplitter {
     }
 
     bool hasWall(const Stretch& stretch, const WallLine& cut) const {
-        return std::ranges::any_of(onLineOf(cut, walls_.lines), [&](const WallLine& wall) {
+        return std::ranges::any_of(onLineOf(cut, lines_), [&](const WallLine& wall) {
             return sameLine(wall, cut) && stretch.lengthIn({wall.from, wall.to}) > wall_margin_m;
         });
     }
 
     const WallLines& walls_;
-    float needed_m_;
+    const std::vector<RowLine> lines_;
+    const float needed_m_;
     std::vector<WallLine> cuts_;
     std::vector<Part> done_;
 };

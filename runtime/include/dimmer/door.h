@@ -6,12 +6,12 @@
 namespace dimmer {
 
 // A hinged leaf: the width that a leaf turned by `angle_rad` no longer covers, (1 - cos a) / (1 - cos a_max), clamped
-// to 0..1. `angle_max_rad`: where the door counts as open, up to pi; at 0, every other angle is open. Signs do not count:
-// leaves turn either way.
+// to 0..1. `angle_max_rad`: where the door counts as open, up to pi; at 0, every other angle is open. Signs do not
+// count: leaves turn either way.
 float hingedDoorWeight(float angle_rad, float angle_max_rad);
 
-// A sliding or lifting leaf: travel / width (height), clamped to 0..1. `width_m`: the travel at which it is open, below 0
-// for a leaf that goes that way; at 0, all travel above 0 is open.
+// A sliding or lifting leaf: travel / width (height), clamped to 0..1. `width_m`: the travel at which it is open, below
+// 0 for a leaf that goes that way; at 0, all travel above 0 is open.
 float slidingDoorWeight(float travel_m, float width_m);
 
 }  // namespace dimmer
