@@ -1,6 +1,5 @@
 #include <cache/scene_keys.h>
 
-#include <probes/air_box.h>
 #include <scene/ies.h>
 
 #include <map>
@@ -232,13 +231,12 @@ Key placesKey(const Key& scene, std::span<const float> what) {
     return KeyBuilder("places").add(scene).addArray(what).finish();
 }
 
-Key gridSettingsKey(const GridSettings& s, const Scene& scene) {
+Key gridSettingsKey(const GridSettings& s, const Scene& scene, const Box& air) {
     KeyBuilder key("grid settings");
     key.add(s.probes_max).add(s.min_spacing_m).add(s.sites).add(s.site_rays).add(s.tolerance);
     key.add(uint32_t{s.uniform}).add(uint32_t{s.fit}).add(uint32_t{s.visibility});
     addPlayAreas(key, scene);
-    for (const glm::vec3 place : placesOfMotion(scene)) add(key, place);
-    return key.finish();
+    return add(add(key, air.min_m), air.max_m).finish();
 }
 
 Key lampOrderKey(const Scene& scene) {

@@ -4,6 +4,7 @@
 #include <bake/bake.h>
 #include <cache/key.h>
 #include <charts/unwrap.h>
+#include <probes/tetrahedra.h>
 #include <scene/scene.h>
 
 #include <span>
@@ -42,8 +43,8 @@ Key sitesKey(const Key& group, std::span<const SiteBlock> blocks);
 // Places in the open.
 Key placesKey(const Key& scene, std::span<const float> what);
 
-// What the global grid depends on besides the groups' light.
-Key gridSettingsKey(const GridSettings& settings, const Scene& scene);
+// What the global grid depends on besides the groups' light. `air`: the box that it fills.
+Key gridSettingsKey(const GridSettings& settings, const Scene& scene, const Box& air);
 // How the groups' lamps take turns in the level: with each group's own, the order of all, by which the grid looks
 // around them.
 Key lampOrderKey(const Scene& scene);

@@ -15,6 +15,7 @@
 #include <pipeline/encode_pack.h>
 #include <pipeline/free_memory.h>
 #include <pipeline/lamps_apart.h>
+#include <probes/air_box.h>
 
 #include <fmt/format.h>
 
@@ -94,7 +95,8 @@ Baked bakeWithCache(const Receivers& at, BakeSettings settings, Progress& progre
         cache->dependsOn("threshold of " + describeGroup(scene, g),
                          KeyBuilder("").add(settings.thresholdOf(g)).finish());
     }
-    const Key grid_settings = gridSettingsKey(settings.grid, scene);
+    const Box air = settings.grid.probes_max > 0 ? airBox(*level.rays) : Box{};
+    const Key grid_settings = gridSettingsKey(settings.grid, scene, air);
     cache->dependsOn("settings of the grid", grid_settings);
     const Key lamp_order = lampOrderKey(scene);
     cache->dependsOn(lamp_order_part, lamp_order);

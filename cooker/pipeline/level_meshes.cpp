@@ -77,11 +77,11 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::s
 
 std::string nodeThatDiffers(const Scene& scene, std::span<const Mesh> of_pack) {
     constexpr float same_m = 1e-3f;  // pieces of cut faces end within a rounding step
-    struct Box {
+    struct Bounds {
         glm::vec3 min_m{std::numeric_limits<float>::max()}, max_m{std::numeric_limits<float>::lowest()};
         void add(glm::vec3 p) { min_m = glm::min(min_m, p), max_m = glm::max(max_m, p); }
     };
-    std::map<std::string, Box> of_level, of_nodes;
+    std::map<std::string, Bounds> of_level, of_nodes;
     for (const SceneMesh& mesh : scene.meshes)
         for (const glm::uvec3& triangle : mesh.triangles)
             for (int i = 0; i < 3 && !mesh.is_open_leaf; ++i) of_level[mesh.node].add(mesh.positions_m[triangle[i]]);

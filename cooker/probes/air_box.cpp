@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/glm.hpp>
 #include <optional>
+#include <vector>
 
 namespace dimmer::cook {
 namespace {
@@ -52,8 +54,7 @@ float topOfOpenGround(const RayScene& rays) {
     return heights[at];
 }
 
-}  // namespace
-
+// Corners of play areas and of what is dynamic, and places for that.
 std::vector<glm::vec3> placesOfMotion(const Scene& scene) {
     std::vector<glm::vec3> places;
     for (const PlayArea& area : scene.play_areas) {
@@ -73,6 +74,8 @@ std::vector<glm::vec3> placesOfMotion(const Scene& scene) {
     }
     return places;
 }
+
+}  // namespace
 
 Box airBox(const RayScene& rays) {
     const glm::vec3 low = rays.boundsMin(), high = rays.boundsMax(), size = high - low;

@@ -4,13 +4,7 @@
 #include <probes/tetrahedra.h>
 #include <trace/ray_scene.h>
 
-#include <glm/glm.hpp>
-#include <vector>
-
 namespace dimmer::cook {
-
-// Corners of play areas and of what is dynamic, and places for that.
-std::vector<glm::vec3> placesOfMotion(const Scene& scene);
 
 // The box of what bakes, of all that moves and of the air over open ground: an open level may be no higher than a kerb.
 // What is farther off than the level is long counts no more. Deterministic; costs some thousand rays.

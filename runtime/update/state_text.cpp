@@ -21,11 +21,11 @@ std::string_view trim(std::string_view text) {
 std::optional<float> parseNumber(std::string_view text) {
     text = trim(text);
     if (text.starts_with('+') && !text.starts_with("+-")) text.remove_prefix(1);
-    // The end of a fade that is no float any more, nor a double, is 0.
-    long double value = 0;
+    // By doubles: the end of a fade that is no float any more is 0 (what is no double either is refused).
+    double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-    if (std::abs(value) > static_cast<long double>(std::numeric_limits<float>::max()) && !std::isinf(value))
+    if (std::abs(value) > static_cast<double>(std::numeric_limits<float>::max()) && !std::isinf(value))
         return std::nullopt;
     return static_cast<float>(value);
 }

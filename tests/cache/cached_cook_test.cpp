@@ -323,6 +323,20 @@ TEST_F(CachedCook, ASetMadeBrighterLeavesTheGrid) {
     EXPECT_FALSE(run(level, true).pack.probes.global.empty());
 }
 
+// Where it is does not matter to the grid, as long as the grid's box reaches there.
+TEST_F(CachedCook, AThingThatMovesWithinTheLevelLeavesTheGrid) {
+    LevelFile level = houseWithGrid();
+    made(level);
+    const auto move = [&](json to) {
+        for (json& node : level.document["nodes"])
+            if (node.value("name", "") == "ball") node["translation"] = std::move(to);
+    };
+    move({0.5, 1.2, 1});
+    EXPECT_THAT(made(level), ElementsAre("pack"));
+    move({0.5, 30, 1});
+    EXPECT_THAT(made(level), testing::IsSupersetOf({"pack", "global grid"}));
+}
+
 // Of the other groups it asks for light at the new places around the lamp alone: from what their surfaces send out, or
 // where that is gone, from their bounces anew.
 TEST_F(CachedCook, ALampMovedMakesTheGridFromWhatIsKnown) {

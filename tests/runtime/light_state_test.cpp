@@ -68,7 +68,6 @@ TEST_F(LightStateTest, NumbersOfATextAreThoseThatProgramsPrint) {
     EXPECT_EQ(weightOf("hall"), Weight(0.5f));
     EXPECT_EQ(weightOf("alarm"), Weight(0));
     EXPECT_EQ(state.open(door("front")), 0.1f);
-    EXPECT_TRUE(state.apply("alarm=1e-400"));
     for (const char* bad : {"hall=+-0.5", "hall=++1", "hall=+", "hall=1e60", "hall=1e999", "hall=0.5x"})
         EXPECT_FALSE(state.apply(bad)) << bad;
     EXPECT_EQ(weightOf("hall"), Weight(0.5f));
