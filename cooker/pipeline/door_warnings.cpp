@@ -1,5 +1,7 @@
 #include <pipeline/door_warnings.h>
 
+#include <scene/combinations.h>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -13,6 +15,7 @@ namespace {
 
 // Pairs told one by one; a corridor of 24 doors has 137, and other warnings are to be seen.
 constexpr size_t pairs_told = 8;
+constexpr size_t chains_told = 3;  // for one door that nothing lights
 constexpr const char* mend = "in the scene's 'dimmer_combinations' (--suggest-combinations prints the list)";
 
 using Doors = std::set<uint32_t>;
@@ -136,8 +139,9 @@ class ElementWarnings {
             Doors chain = doors;
             chain.insert(door);
             const auto holds = [&](const Doors& other) { return std::ranges::includes(other, chain); };
-            if (std::ranges::any_of(is_named, holds)) continue;
+            if (chain.size() > combined_doors_max || std::ranges::any_of(is_named, holds)) continue;
             if (std::ranges::find(chains, chain) == chains.end()) chains.push_back(std::move(chain));
+            if (chains.size() == chains_told) break;
         }
         return chains;
     }

@@ -1,5 +1,6 @@
 #include <dimmer/pack.h>
 #include <fmt/format.h>
+#include <scene/combinations.h>
 #include <scene/elements.h>
 
 #include <algorithm>
@@ -7,8 +8,6 @@
 
 namespace dimmer::cook {
 
-// Of one combination: each may be open, closed or either, so that a light group has 3^8 = 6561 paths of them.
-constexpr std::ptrdiff_t combined_doors_max = 8;
 constexpr double rotation_length_max = 2;  // of a quaternion that was written by hand, as 0 1 0 1
 
 Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
@@ -134,7 +133,7 @@ Expected<void> Elements::combination(const tinygltf::Value& list) {
                               "one combination names two light sets. The light of two sets simply "
                               "adds up: name at most one set with the doors.");
     const auto doors = std::ranges::count(combination, true, &ElementRef::is_door);
-    if (doors > combined_doors_max)
+    if (doors > static_cast<std::ptrdiff_t>(combined_doors_max))
         return context_.error("'dimmer_combinations'",
                               fmt::format("one combination names {} doors, whose light is kept for every way in which "
                                           "each is open, closed or either; {} are the most. Name fewer, or several "

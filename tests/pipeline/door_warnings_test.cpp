@@ -73,6 +73,30 @@ TEST(DoorWarnings, ADoorBehindTwoOthersIsToBeNamedWithThem) {
     EXPECT_EQ(stats.warnings[0], "row.gltf: door 's' changes no light; it is kept, and does nothing");
 }
 
+// What is suggested can be named: eight doors at most in one list, and a few lists for a door.
+TEST(DoorWarnings, ChainsAreAsLongAndAsManyAsALevelMayName) {
+    DoorRow row(doors_in_row - 1);  // the last one is dark
+    for (uint32_t d = 0; d < 20; ++d) row.scene.doors.push_back({"x" + std::to_string(d), false});
+    const auto last = doors_in_row - 1;
+    std::vector<ElementRef> eight = {{true, last - 1}};
+    Term term;
+    row.baked.terms.clear();
+    row.baked.reports.clear();
+    for (uint32_t d = 0; d < row.scene.doors.size(); ++d) {
+        if (d == last) continue;
+        term.doors_open = {d};
+        row.baked.terms.push_back(term);
+        row.baked.reports.push_back({.receivers = 9, .energy = 1});
+        if (d > last && eight.size() < 8) eight.push_back({true, d});
+    }
+    row.scene.combinations = {eight};
+    EXPECT_TRUE(row.stats().suggested_combinations.empty());
+    row.scene.combinations.clear();
+    for (uint32_t d = last + 1; d < row.scene.doors.size(); ++d)
+        row.scene.combinations.push_back({{true, last - 1}, {true, d}});
+    EXPECT_EQ(row.stats().suggested_combinations.size(), 3u);
+}
+
 TEST(DoorWarnings, OfManyPairsTheLargestAreTold) {
     DoorRow row(doors_in_row);
     for (uint32_t i = 0; i < 20; ++i) row.baked.dependent_doors.push_back({0, 1, 0.5f - 0.01f * static_cast<float>(i)});
