@@ -218,7 +218,8 @@ std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeS
         // aside: a room that is black instead of dim shows, however little of the first one's light gets there.
         const bool all = off > all_but_gaps * less;
         const bool shows = off > black_share * static_cast<double>(settings.threshold) * more;
-        const float loss = !all ? static_cast<float>(off / less) : shows ? INFINITY : 0;
+        if (!(off > 0) || (all && !shows)) continue;
+        const float loss = all ? INFINITY : static_cast<float>(off / less);
         if (loss > settings.threshold) found.push_back({first, second, loss});
     }
     std::ranges::stable_sort(found, std::greater{}, &DoorPair::loss);
