@@ -123,6 +123,7 @@ Expected<Script> prepareScript(const Arguments& arguments, const Pack& pack) {
     auto script = parseScript(text, arguments.script, pack);
     if (!script) return script;
     std::ranges::copy(ballsAtPlaces(pack), std::back_inserter(script->balls));
+    for (const std::string& warning : script->warnings) say("dimmer-sample: warning: " + warning);
     if (arguments.frames) script->frames = arguments.frames;
     if (!arguments.size.empty())
         if (auto done = applySize(arguments.size, *script); !done) return std::unexpected(done.error());

@@ -72,9 +72,12 @@ std::string_view withoutComment(std::string_view text) {
 
 class Parser {
    public:
-    explicit Parser(const Pack& pack) : pack_(pack), rehearsal_(pack) { script_.camera = defaultCamera(pack); }
+    Parser(const Pack& pack, std::string_view file) : pack_(pack), file_(file), rehearsal_(pack) {
+        script_.camera = defaultCamera(pack);
+    }
 
     Expected<void> line(std::string_view text) {
+        ++line_;
         Words words(withoutComment(text));
         if (words.empty()) return {};
         const std::string_view command = words.next();
@@ -84,11 +87,19 @@ class Parser {
         return {};
     }
 
+    std::string where(uint32_t line) const { return fmt::format("{}:{}: ", file_, line); }
+    std::string where() const { return where(line_); }
+
     Script finish() {
         std::stable_sort(script_.steps.begin(), script_.steps.end(),
                          [](const Step& a, const Step& b) { return a.frame < b.frame; });
         if (!frames_given_)
             script_.frames = std::min(frame_count_max, last_frame_ + static_cast<uint32_t>(std::ceil(script_.fps)));
+        for (const Step& step : script_.steps)
+            if (step.frame >= script_.frames)
+                script_.warnings.push_back(where(step.line) +
+                                           fmt::format("\"{}\" is not played: frame {} is past the last of {} frames.",
+                                                       step.text, step.frame, script_.frames));
         return std::move(script_);
     }
 
@@ -145,6 +156,7 @@ class Parser {
 
     Expected<void> step(Words& words) {
         Step step;
+        step.line = line_;
         if (auto done = count(words, 0, frame_count_max, step.frame); !done) return done;
         step.text = words.rest();
         last_frame_ = std::max(last_frame_, step.frame);
@@ -271,6 +283,8 @@ class Parser {
     }
 
     const Pack& pack_;
+    std::string_view file_;
+    uint32_t line_ = 0;
     CpuRuntime rehearsal_;  // takes every state once, so that what the runtime would refuse is refused now
     Script script_;
     bool frames_given_ = false;
@@ -280,11 +294,11 @@ class Parser {
 }  // namespace
 
 Expected<Script> parseScript(std::string_view text, std::string_view file, const Pack& pack) {
-    Parser parser(pack);
-    for (uint32_t line = 1; !text.empty(); ++line) {
+    Parser parser(pack, file);
+    while (!text.empty()) {
         const size_t end = std::min(text.find('\n'), text.size());
         if (auto done = parser.line(text.substr(0, end)); !done)
-            return fail(ErrorCode::BadInput, fmt::format("{}:{}: {}", file, line, done.error().message));
+            return fail(ErrorCode::BadInput, parser.where() + done.error().message);
         text.remove_prefix(std::min(end + 1, text.size()));
     }
     return parser.finish();

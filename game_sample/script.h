@@ -54,7 +54,8 @@ struct CameraMove {
 
 struct Step {
     uint32_t frame = 0;
-    std::string text;  // as written, without "at FRAME"
+    uint32_t line = 0;  // of the file
+    std::string text;   // as written, without "at FRAME"
     std::variant<SetState, Fade, Flicker, CameraCut, CameraMove> action;
 };
 
@@ -75,12 +76,14 @@ struct Script {
     std::vector<Ball> balls;
     float probe_radius_m = 0;  // 0: probes are not drawn
     std::vector<Step> steps;   // by frame; those of one frame in the order written
+    std::vector<std::string> warnings;
 };
 
 inline constexpr uint32_t image_side_max = 8192;  // pixels; keeps a typing error from asking for a terabyte
 inline constexpr uint32_t frame_count_max = 1'000'000;
 
-// Names and weights are checked against the pack, so a script that parses also plays. Errors begin with `file`:line.
+// Names and weights are checked against the pack, so a script that parses also plays. Errors and warnings begin with
+// `file`:line.
 Expected<Script> parseScript(std::string_view text, std::string_view file, const Pack& pack);
 
 }  // namespace dimmer::sample

@@ -236,7 +236,7 @@ void TrialGrid::findVisibility(Asked asked, uint32_t points) {
             corners[k] = vec(grid.positions[t.probes[k]]);
             free[k] = isFree(t.probes[k]);
         }
-        grid.visibility[fresh[i]] = cook::findVisibility(rays_, corners, free, inside[i], &cells_, points);
+        grid.visibility[fresh[i]] = cook::findVisibility(rays_, air_, corners, free, inside[i], &cells_, points);
     });
     for (const uint32_t t : fresh) seen_.emplace(keyOf(grid.tetrahedra[t]), grid.visibility[t]);
 }

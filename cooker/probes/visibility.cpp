@@ -12,16 +12,16 @@ namespace {
 
 // Rows that sort points alike differ in what of the geometry between they take for seen: the face of the wall that is
 // nearer to the probe has less, and hides what no point happened to stand at. More than there are such points for each
-// that counts, even beyond the level.
+// that counts, even beyond the level's air.
 constexpr uint32_t draw_scale = 16384;
 constexpr uint32_t tries_per_sample = 3;
 constexpr float off_surface_share = 0.02f;  // of the way to a probe
 constexpr float same_plane_m = 1e-4f;
 constexpr uint32_t leak_cost = 3, miss_cost = 1;
 constexpr uint32_t lonely_miss_cost = 8;  // of a point that no other probe is taken to see
-// Beyond the level's box, over which the grid's own reaches, hardly anyone asks for light: points there count so many
-// times less, and decide where there are no others. That somebody may stand on the highest roof is not worth it: with
-// 2 m of air counted there, a wall of two_rooms lets light through in three of fourteen placements.
+// Beyond the box of the level's air, over which the grid's own reaches, hardly anyone asks for light: points there
+// count so many times less, and decide where there are no others. That somebody may stand on the highest roof is not
+// worth it: with 2 m of air counted there, a wall of two_rooms lets light through in three of fourteen placements.
 constexpr uint32_t beyond_share = 16;
 constexpr std::array<int8_t, 4> seen_everywhere = {127, 127, 127, 127};
 constexpr std::array<int8_t, 4> seen_nowhere = {-127, -127, -127, -127};
@@ -79,10 +79,11 @@ std::array<Weights, corner_samples> pointsAtCorners() {
 // One worker's scratch, for one tetrahedron after another.
 class Table {
    public:
-    TetrahedronVisibility find(const RayScene& rays, const Obstacles& obstacles, const std::array<bool, 4>& free,
-                               std::span<const Weights> places, uint32_t points) {
+    TetrahedronVisibility find(const RayScene& rays, const Box& air, const Obstacles& obstacles,
+                               const std::array<bool, 4>& free, std::span<const Weights> places, uint32_t points) {
         clear();
         rays_ = &rays;
+        air_ = air;
         obstacles_ = &obstacles;
         free_ = free;
         for (const Weights& w : pointsAtCorners()) look(w);
@@ -140,7 +141,7 @@ class Table {
             if (found[v].last != found[v].first) numberOf(found[v].last);
         }
         const bool open = 2 * backs <= hidden || point.seen != std::array<bool, 4>{};
-        if (open && !isInLevel(w)) {
+        if (open && !isInAir(w)) {
             point.scale = draw_scale / beyond_share;
             ++besides_;
         }
@@ -148,9 +149,9 @@ class Table {
         if (!open && surfaces) lookAtSurface(w, found);
     }
 
-    bool isInLevel(const Weights& w) const {
+    bool isInAir(const Weights& w) const {
         const glm::vec3 p = obstacles_->position(w);
-        return p == glm::clamp(p, rays_->boundsMin(), rays_->boundsMax());
+        return p == glm::clamp(p, air_.min_m, air_.max_m);
     }
 
     // From where ways to the probes come out of geometry: what is open of a tetrahedron that lies below the floor for
@@ -291,10 +292,11 @@ class Table {
     };
 
     const RayScene* rays_ = nullptr;
+    Box air_;
     const Obstacles* obstacles_ = nullptr;
     std::array<bool, 4> free_ = {};
     std::vector<Point> points_, buried_;
-    size_t besides_ = 0;  // of points_, at surfaces or beyond the level
+    size_t besides_ = 0;  // of points_, at surfaces or beyond the air
     std::vector<Group> points_grouped_, buried_grouped_;
     std::vector<Weights> planes_;                         // that stopped rays
     std::vector<std::pair<uint32_t, uint32_t>> numbers_;  // triangle, the number of its plane
@@ -303,13 +305,13 @@ class Table {
 
 }  // namespace
 
-TetrahedronVisibility findVisibility(const RayScene& rays, const std::array<glm::vec3, 4>& corners,
+TetrahedronVisibility findVisibility(const RayScene& rays, const Box& air, const std::array<glm::vec3, 4>& corners,
                                      const std::array<bool, 4>& free, std::span<const std::array<float, 4>> places,
                                      const TriangleCells* cells, uint32_t points) {
     const Obstacles obstacles(rays, cells, corners);
     if (!obstacles.none()) {
         thread_local Table table;
-        return table.find(rays, obstacles, free, places, points);
+        return table.find(rays, air, obstacles, free, places, points);
     }
     TetrahedronVisibility out;
     for (size_t v = 0; v < 4; ++v) out.seen[v] = free[v] ? seen_everywhere : seen_nowhere;

@@ -209,8 +209,9 @@ class LevelImporter {
         if (!dynamic) return std::unexpected(dynamic.error());
         constexpr Lighting of_choice[] = {Lighting::Lightmap, Lighting::LocalGrid, Lighting::Dynamic, Lighting::None};
         const Lighting lighting = *stated ? of_choice[**stated] : Lighting::Automatic;
-        if (!*dynamic) return lighting;
-        if (*stated && lighting != Lighting::Dynamic)
+        const bool says_no = extras.has("dimmer_dynamic") && !*dynamic;
+        if (!*dynamic && !(says_no && lighting == Lighting::Dynamic)) return lighting;
+        if (*stated && (says_no || lighting != Lighting::Dynamic))
             return context_.error(owner, "'dimmer_dynamic' contradicts its 'dimmer_lighting'. Remove one of them.");
         return Lighting::Dynamic;
     }
@@ -220,7 +221,7 @@ class LevelImporter {
         std::optional<float> texels_per_metre, grid_spacing_m;
     };
 
-    Expected<MeshSettings> meshSettings(const Extras& extras, const std::string& owner) const {
+    Expected<MeshSettings> meshSettings(const Extras& extras, const std::string& owner) {
         const auto lighting = this->lighting(extras, owner);
         if (!lighting) return std::unexpected(lighting.error());
         const auto density = extras.positive("dimmer_texel_density");
@@ -231,6 +232,7 @@ class LevelImporter {
                                                      **density, texel_density_max));
         const auto spacing = extras.positive("dimmer_grid_spacing");
         if (!spacing) return std::unexpected(spacing.error());
+        warnOfOtherLightingsKeys(context_, extras, owner, *lighting);
         const auto narrow = [](std::optional<double> value) {
             return value ? std::optional(static_cast<float>(*value)) : std::nullopt;
         };
@@ -376,6 +378,10 @@ class LevelImporter {
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};
         if (at.singular != -1) return singular(at, owner);
+        if (!(glm::length(glm::dvec3(at.world_from_node[3])) <= coordinate_max_m))
+            return context_.error(owner, fmt::format("is a place for what moves, more than {:.0f} km from the origin. "
+                                                     "Correct its translation.",
+                                                     coordinate_max_m / 1000));
         scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
         return {};
     }

@@ -23,6 +23,16 @@ Expected<void> warnOfMisplacedKeys(ImportContext& context, const Extras& extras,
     return {};
 }
 
+void warnOfOtherLightingsKeys(ImportContext& context, const Extras& extras, const std::string& owner,
+                              Lighting lighting) {
+    const auto warnUnless = [&](Lighting wanted, const char* key, const char* what) {
+        if (lighting != Lighting::Automatic && lighting != wanted && extras.has(key))
+            context.warn(owner, fmt::format("'{}' is for {} and was ignored.", key, what));
+    };
+    warnUnless(Lighting::Lightmap, "dimmer_texel_density", "meshes with a lightmap");
+    warnUnless(Lighting::LocalGrid, "dimmer_grid_spacing", "meshes whose 'dimmer_lighting' is 'local_grid'");
+}
+
 void warnOfPoseWithoutDoor(ImportContext& context, const Extras& extras, const std::string& owner) {
     for (const char* key : {"dimmer_door_open", "dimmer_door_rotation", "dimmer_door_translation"})
         if (extras.has(key))

@@ -16,6 +16,10 @@ struct NodeContent {
 Expected<void> warnOfMisplacedKeys(ImportContext& context, const Extras& extras, const std::string& owner,
                                    NodeContent content);
 
+// Warns of a mesh's keys that are for another way to receive light than the stated one.
+void warnOfOtherLightingsKeys(ImportContext& context, const Extras& extras, const std::string& owner,
+                              Lighting lighting);
+
 // Of a node that names no door: a pose belongs to the node that does.
 void warnOfPoseWithoutDoor(ImportContext& context, const Extras& extras, const std::string& owner);
 

@@ -92,7 +92,13 @@ Expected<std::vector<StateAssignment>> parseState(std::string_view text) {
     if (trim(text).empty()) return assignments;
     for (size_t begin = 0; begin <= text.size();) {
         const size_t end = std::min(text.find(',', begin), text.size());
-        auto assignment = parseAssignment(trim(text.substr(begin, end - begin)));
+        const std::string_view item = trim(text.substr(begin, end - begin));
+        if (item.empty())
+            return fail(
+                ErrorCode::InvalidArgument,
+                fmt::format("State \"{}\": an item is empty, not NAME=VALUE; an example: hall=0.5,door:front=1.",
+                            text));
+        auto assignment = parseAssignment(item);
         if (!assignment) return std::unexpected(std::move(assignment.error()));
         assignments.push_back(*assignment);
         begin = end + 1;

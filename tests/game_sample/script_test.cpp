@@ -116,6 +116,13 @@ TEST(SampleScript, WithoutFramesLastsASecondPastTheLastStep) {
     EXPECT_EQ(parse("fps 10\nat 5 fade hall 0 1 over 20").frames, 35u);
 }
 
+TEST(SampleScript, TellsOfStepsPastTheLastFrame) {
+    const Script cut = parse("frames 10\nat 9 set hall=1\nat 10 set hall=0\n");
+    ASSERT_EQ(cut.warnings.size(), 1u);
+    EXPECT_THAT(cut.warnings[0], AllOf(StartsWith("test.script:3: "), HasSubstr("hall=0"), HasSubstr("10 frames")));
+    EXPECT_TRUE(parse("at 10 set hall=0").warnings.empty());
+}
+
 TEST(SampleScript, ErrorsNameTheLineAndTheMend) {
     EXPECT_THAT(parseError("\n\nat 5 set hal=1"), AllOf(StartsWith("test.script:3: "), HasSubstr("hal")));
     EXPECT_THAT(parseError("frame 5"), HasSubstr("unknown command \"frame\""));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <pipeline/cook_settings.h>
 #include <pipeline/small_level.h>
+#include <probes/air_box.h>
 #include <probes/placement.h>
 #include <probes/spherical_harmonics.h>
 #include <probes/tetrahedron_walk.h>
@@ -164,7 +165,7 @@ TEST(Visibility, EndsAtAWall) {
     addQuad(scene, "wall", {1, 0, 0}, {0, 0, 9}, {0, 9, 0}, white);  // the plane x = 1
     const RayScene rays(scene);
     const std::array<glm::vec3, 4> corners = {glm::vec3(0, 0, 0), {3, 0, 0}, {0, 2, 0}, {2, 0, 2}};
-    const TetrahedronVisibility table = findVisibility(rays, corners, {true, true, true, true});
+    const TetrahedronVisibility table = findVisibility(rays, airBox(rays), corners, {true, true, true, true});
     GlobalGrid grid;
     grid.tetrahedra.resize(1);
     grid.visibility = {table};
@@ -184,10 +185,10 @@ TEST(Visibility, InTheOpenEverythingIsSeen) {
     addFloor(scene, 9, addMaterial(scene, lambert(0.5f)), -1);
     const RayScene rays(scene);
     const std::array<glm::vec3, 4> corners = {glm::vec3(0, 0, 0), {3, 0, 0}, {0, 2, 0}, {2, 0, 2}};
-    const TetrahedronVisibility open = findVisibility(rays, corners, {true, true, true, true});
+    const TetrahedronVisibility open = findVisibility(rays, airBox(rays), corners, {true, true, true, true});
     for (const auto& row : open.seen) EXPECT_EQ(row, (std::array<int8_t, 4>{127, 127, 127, 127}));
     // A corner of the box that stands in geometry sees nothing.
-    const TetrahedronVisibility blind = findVisibility(rays, corners, {true, true, false, true});
+    const TetrahedronVisibility blind = findVisibility(rays, airBox(rays), corners, {true, true, false, true});
     for (const int8_t value : blind.seen[2]) EXPECT_LT(value, 0);
 }
 
@@ -201,7 +202,7 @@ TEST(Visibility, LooksAtTheOpenPartAlone) {
     const std::array<glm::vec3, 4> corners = {glm::vec3(3, 0.3f, -1), {3, 0.3f, 1}, {-4, 0.2f, 0}, {0, -9, 0}};
     GlobalGrid grid;
     grid.tetrahedra.resize(1);
-    grid.visibility = {findVisibility(rays, corners, {true, true, true, false})};
+    grid.visibility = {findVisibility(rays, airBox(rays), corners, {true, true, true, false})};
     size_t checked = 0;
     for (uint32_t i = 0; i < 2000; ++i) {
         glm::vec4 b(unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)), 0.05f * unitFloat(hash(i, 4)));
@@ -229,7 +230,7 @@ TEST(Visibility, WhatLiesBeyondTheLevelDecidesNothing) {
     for (const bool corner_free : {false, true}) {
         GlobalGrid grid;
         grid.tetrahedra.resize(1);
-        grid.visibility = {findVisibility(rays, corners, {corner_free, true, true, corner_free})};
+        grid.visibility = {findVisibility(rays, airBox(rays), corners, {corner_free, true, true, corner_free})};
         size_t checked = 0, by_own = 0;
         for (uint32_t i = 0; i < 4000; ++i) {
             glm::vec4 b(0.1f * unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)),
@@ -249,6 +250,34 @@ TEST(Visibility, WhatLiesBeyondTheLevelDecidesNothing) {
     }
 }
 
+// A kerb is all that rises from the ground: where people walk is the air over it, beyond the level's own box.
+TEST(Visibility, TheAirOverALowLevelDecides) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.5f));
+    addFloor(scene, 5, white);
+    addSolid(scene, "kerb", {0, 0.2f, 0}, {0.1f, 0.2f, 5}, white);
+    const RayScene rays(scene);
+    const Box level{rays.boundsMin(), rays.boundsMax()}, air = airBox(rays);
+    ASSERT_GT(air.max_m.y, 2.4f);
+    const std::array<glm::vec3, 4> corners = {glm::vec3(-2, 0.1f, 0), {2, 0.1f, 0}, {0, 3, -2}, {0, 3, 2}};
+    const auto seenOfTheAir = [&](const Box& counts) {
+        const auto table = findVisibility(rays, counts, corners, {true, true, true, true});
+        int seen = 0;
+        for (uint32_t i = 0; i < 4000; ++i) {
+            glm::vec4 b(unitFloat(hash(i, 1)), unitFloat(hash(i, 2)), unitFloat(hash(i, 3)), unitFloat(hash(i, 4)));
+            b /= b.x + b.y + b.z + b.w;
+            const glm::vec3 p = b.x * corners[0] + b.y * corners[1] + b.z * corners[2] + b.w * corners[3];
+            for (size_t v = 0; v < 4; ++v) {
+                const auto& row = table.seen[v];
+                if (rays.blocked(p, corners[v])) continue;
+                seen += float(row[0]) * b.x + float(row[1]) * b.y + float(row[2]) * b.z + float(row[3]) * b.w > 0;
+            }
+        }
+        return seen;
+    };
+    EXPECT_GT(seenOfTheAir(air), 1.05 * seenOfTheAir(level)) << seenOfTheAir(level);
+}
+
 // Behind the wall stands only a corner of the box, which sees nothing: what lies on its side belongs to it, not to the
 // probes of the other room.
 TEST(Visibility, WhatNoProbeSeesBelongsToTheCornerOnItsSide) {
@@ -259,7 +288,7 @@ TEST(Visibility, WhatNoProbeSeesBelongsToTheCornerOnItsSide) {
     const std::array<glm::vec3, 4> corners = {glm::vec3(0, 0, 0), {0, 2, 0}, {0, 0, 2}, {4, 1, 1}};
     GlobalGrid grid;
     grid.tetrahedra.resize(1);
-    grid.visibility = {findVisibility(rays, corners, {true, true, true, false})};
+    grid.visibility = {findVisibility(rays, airBox(rays), corners, {true, true, true, false})};
     for (const float far : {0.1f, 0.2f, 0.35f, 0.6f, 0.9f}) {  // the wall is at 0.25
         const auto weights = probeWeights(grid, {0, {(1 - far) / 3, (1 - far) / 3, (1 - far) / 3, far}});
         EXPECT_EQ(weights[3] > 0, far > 0.25f) << far;

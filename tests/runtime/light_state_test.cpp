@@ -136,12 +136,14 @@ TEST_F(LightStateTest, AllComesFirstWhereverItIsWritten) {
 
 TEST_F(LightStateTest, ABadTextStateNamesTheItemAndChangesNothing) {
     const std::pair<const char*, const char*> cases[] = {
-        {"hall=0,halll=1", "\"hall\""},      {"hall=0,alarm=3", "\"alarm\""},      {"hall=0,alarm=1/2", "1/2"},
-        {"hall=0,alarm=x", "\"alarm=x\""},   {"hall=0,alarm", "\"alarm\""},        {"hall=0,=1", "\"=1\""},
-        {"hall=0,alarm=", "\"alarm=\""},     {"hall=0,door:front=2", "\"front\""}, {"hall=0,door:frnt=1", "\"front\""},
-        {"hall=0,alarm=nan", "\"alarm\""},   {"hall=0,door:front=1/1/1", "door"},  {"hall=0,,", "NAME=VALUE"},
-        {"hall=0,all=1.5", "\"hall\""},      {"hall=0,alarm=1e99", "1e99"},        {"hall=0,alarm=1/1/1/1", "1/1/1/1"},
-        {"hall=0,alarm=0.5 0.5", "0.5 0.5"},
+        {"hall=0,halll=1", "\"hall\""},      {"hall=0,alarm=3", "\"alarm\""},
+        {"hall=0,alarm=1/2", "1/2"},         {"hall=0,alarm=x", "\"alarm=x\""},
+        {"hall=0,alarm", "\"alarm\""},       {"hall=0,=1", "\"=1\""},
+        {"hall=0,alarm=", "\"alarm=\""},     {"hall=0,door:front=2", "\"front\""},
+        {"hall=0,door:frnt=1", "\"front\""}, {"hall=0,alarm=nan", "\"alarm\""},
+        {"hall=0,door:front=1/1/1", "door"}, {"hall=0,,", "State \"hall=0,,\": an item is empty"},
+        {"hall=0,all=1.5", "\"hall\""},      {"hall=0,alarm=1e99", "1e99"},
+        {"hall=0,alarm=1/1/1/1", "1/1/1/1"}, {"hall=0,alarm=0.5 0.5", "0.5 0.5"},
     };
     for (const auto& [text, named] : cases) {
         const auto refused = state.apply(text);

@@ -378,6 +378,9 @@ TEST(SceneBadInput, Transforms) {
     LevelFile place = LevelFile::withFloor();
     place.addNode({{"name", "spawn"}, {"scale", {0, 0, 0}}, {"extras", {{"dimmer_dynamic", true}}}});
     expectBadInput(place.import(), {"node 'spawn'", "singular"});
+    LevelFile far = LevelFile::withFloor();
+    far.addNode({{"name", "spawn"}, {"translation", {0, 2e9, 0}}, {"extras", {{"dimmer_dynamic", true}}}});
+    expectBadInput(far.import(), {"node 'spawn'", "1000 km"});
 }
 
 TEST(SceneBadInput, RequiredExtensionsMustBeKnown) {

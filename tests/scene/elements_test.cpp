@@ -502,9 +502,39 @@ TEST(SceneElements, HowMeshesReceiveLight) {
         EXPECT_EQ(scene->meshes[0].grid_spacing_m, 0.5f);
         EXPECT_TRUE(scene->dynamic_places.empty());
     }
-    LevelFile contradiction = LevelFile::withFloor();
-    contradiction.node(0)["extras"] = {{"dimmer_dynamic", 1}, {"dimmer_lighting", "lightmap"}};
-    expectBadInput(contradiction.import(), {"node 'floor'", "dimmer_dynamic", "dimmer_lighting"});
+    const json contradictions[] = {{{"dimmer_dynamic", 1}, {"dimmer_lighting", "lightmap"}},
+                                   {{"dimmer_dynamic", 0}, {"dimmer_lighting", "dynamic"}}};
+    for (const json& extras : contradictions) {
+        LevelFile level = LevelFile::withFloor();
+        level.node(0)["extras"] = extras;
+        expectBadInput(level.import(), {"node 'floor'", "dimmer_dynamic", "dimmer_lighting"});
+    }
+    LevelFile alike = LevelFile::withFloor();
+    alike.node(0)["extras"] = {{"dimmer_dynamic", 0}, {"dimmer_lighting", "lightmap"}};
+    ASSERT_IMPORTED(alike.import());
+}
+
+// Nothing would tell that the number does nothing.
+TEST(SceneElements, KeysOfAnotherLightingAreTold) {
+    const std::pair<const char*, std::vector<const char*>> ignored[] = {
+        {"lightmap", {"dimmer_grid_spacing"}},
+        {"local_grid", {"dimmer_texel_density"}},
+        {"dynamic", {"dimmer_texel_density", "dimmer_grid_spacing"}},
+        {"none", {"dimmer_texel_density", "dimmer_grid_spacing"}}};
+    for (const auto& [lighting, keys] : ignored) {
+        LevelFile level = LevelFile::withFloor();
+        level.node(0)["extras"] = {
+            {"dimmer_lighting", lighting}, {"dimmer_texel_density", 16}, {"dimmer_grid_spacing", 0.5}};
+        const auto scene = level.import();
+        ASSERT_IMPORTED(scene);
+        EXPECT_EQ(scene->warnings.size(), keys.size()) << lighting;
+        for (const char* key : keys) expectWarning(*scene, {"node 'floor'", std::string("'") + key + "'", "ignored"});
+    }
+    LevelFile open = LevelFile::withFloor();  // either may hold
+    open.node(0)["extras"] = {{"dimmer_texel_density", 16}, {"dimmer_grid_spacing", 0.5}};
+    const auto scene = open.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_TRUE(scene->warnings.empty());
 }
 
 TEST(SceneElements, EmptyNodesArePlacesAndPlayAreasAreNoGeometry) {
