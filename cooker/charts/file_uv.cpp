@@ -2,30 +2,53 @@
 
 #include <charts/raster.h>
 
+#include <algorithm>
 #include <bit>
 #include <map>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 namespace dimmer::cook {
 namespace {
 
-// Overlaps of a file's own UVs are looked for on a grid this fine.
+// Overlaps of a file's own UVs are looked for on a grid of so many cells over what the mesh takes of the unwrap, which
+// of an atlas may be little.
 constexpr uint32_t overlap_grid = 1024;
+// Of the unwrap: less is a quarter of a texel of a page with 4096.
+constexpr float least_span = 1.0f / 16384;
+// As far beyond 0..1 as tools round, and far less than a texel.
+constexpr float rounding = 1e-5f;
+
+struct UvBounds {
+    glm::vec2 low{1}, high{0};
+};
+
+std::optional<UvBounds> boundsOf(const SceneMesh& mesh) {
+    UvBounds bounds;
+    for (const glm::uvec3 triangle : mesh.triangles)
+        for (int i = 0; i < 3; ++i) {
+            const glm::vec2 c = mesh.uv1[triangle[i]];
+            if (!(c.x >= 0 && c.x <= 1 && c.y >= 0 && c.y <= 1)) return std::nullopt;
+            bounds.low = glm::min(bounds.low, c);
+            bounds.high = glm::max(bounds.high, c);
+        }
+    return bounds;
+}
 
 // Why the mesh's TEXCOORD_1 is no unwrap; empty when it is one.
 std::string unwrapFault(const SceneMesh& mesh) {
+    const auto bounds = boundsOf(mesh);
+    if (!bounds) return "they leave 0..1";
+    const glm::vec2 span = bounds->high - bounds->low;
+    if (std::min(span.x, span.y) < least_span) return "they span next to nothing";
     std::vector<uint8_t> taken(size_t{overlap_grid} * overlap_grid);
-    const float grid = overlap_grid;
+    const glm::vec2 grid = static_cast<float>(overlap_grid) / span;
     for (const glm::uvec3 triangle : mesh.triangles) {
         std::array<glm::vec2, 3> uv;
-        for (int i = 0; i < 3; ++i) {
-            uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
-            const glm::vec2 c = uv[static_cast<size_t>(i)];
-            if (!(c.x >= 0 && c.x <= 1 && c.y >= 0 && c.y <= 1)) return "they leave 0..1";
-        }
+        for (int i = 0; i < 3; ++i) uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
         if (std::abs(cross2d(uv[1] - uv[0], uv[2] - uv[0])) < 1e-12f) return "a triangle has no area in them";
-        for (auto& c : uv) c *= grid;
+        for (auto& c : uv) c = (c - bounds->low) * grid;
         bool overlaps = false;
         forEachCoveredCentre(uv, {overlap_grid, overlap_grid}, [&](uint32_t x, uint32_t y) {
             uint8_t& cell = taken[size_t{y} * overlap_grid + x];
@@ -37,11 +60,21 @@ std::string unwrapFault(const SceneMesh& mesh) {
     return {};
 }
 
+// What tools round to just beyond 0..1.
+void clampRounding(std::vector<glm::vec2>& uvs) {
+    for (glm::vec2& uv : uvs) {
+        const glm::vec2 inside = glm::clamp(uv, 0.0f, 1.0f);
+        for (int i = 0; i < 2; ++i)
+            if (std::abs(uv[i] - inside[i]) <= rounding) uv[i] = inside[i];
+    }
+}
+
 }  // namespace
 
 void dropInvalidUnwraps(Scene& scene) {
     for (SceneMesh& mesh : scene.meshes) {
         if (mesh.uv1.empty() || mesh.triangles.empty() || !hasLightmap(mesh)) continue;
+        clampRounding(mesh.uv1);
         mesh.uv1_fault = unwrapFault(mesh);
         if (!mesh.uv1_fault.empty()) mesh.uv1.clear();
     }

@@ -9,8 +9,8 @@
 
 namespace dimmer::cook {
 
-// Empties SceneMesh::uv1 where it is no unwrap (inside 0..1, every triangle with area, no two on one spot) and says why
-// in uv1_fault. Only of meshes that get a lightmap.
+// Empties SceneMesh::uv1 where it is no unwrap (inside 0..1 but for rounding, which it clamps; every triangle with
+// area, no two on one spot) and says why in uv1_fault. Only of meshes that get a lightmap.
 void dropInvalidUnwraps(Scene& scene);
 
 // The given triangles (of SceneMesh::triangles) by the pieces of the unwrap that they lie in, which share no corner:

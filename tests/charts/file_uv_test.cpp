@@ -54,6 +54,35 @@ TEST(FileUv, PiecesSideBySideStayOneChart) {
     EXPECT_NEAR(charts.charts[0].width, 21 + 2, 1);
 }
 
+std::string faultOf(glm::vec2 first, glm::vec2 second, glm::vec2 scale, glm::vec2 shift = {}) {
+    Scene scene = twoSquares(first, second);
+    for (glm::vec2& uv : scene.meshes[0].uv1) uv = scale * uv + shift;
+    dropInvalidUnwraps(scene);
+    for (const glm::vec2 uv : scene.meshes[0].uv1) EXPECT_EQ(uv, glm::clamp(uv, 0.0f, 1.0f));
+    EXPECT_EQ(scene.meshes[0].uv1.empty(), !scene.meshes[0].uv1_fault.empty());
+    return scene.meshes[0].uv1_fault;
+}
+
+// Of an atlas a mesh may take one texel in thousands, however long: overlaps were looked for all over it, and not
+// found.
+TEST(FileUv, OverlapsAreFoundHoweverSmallTheUnwrap) {
+    for (const glm::vec2 scale : {glm::vec2(1), {0.01f, 0.01f}, {1, 0.01f}, {0.01f, 1}}) {
+        EXPECT_EQ(faultOf({0, 0}, {0.05f, 0.05f}, scale), "they overlap") << scale.x << " " << scale.y;
+        EXPECT_EQ(faultOf({0, 0}, {0.1f, 0}, scale), "") << scale.x << " " << scale.y;
+    }
+    EXPECT_EQ(faultOf({0, 0}, {0.1f, 0}, {1, 1e-4f}), "they span next to nothing");
+    EXPECT_EQ(faultOf({0, 0}, {0, 0.1f}, {1e-4f, 1}), "they span next to nothing");
+}
+
+TEST(FileUv, RoundingBeyondThePageIsNone) {
+    const glm::vec2 low(0, 0), high(0.9f, 0.9f);
+    EXPECT_EQ(faultOf(low, high, glm::vec2(1), glm::vec2(-1e-9f)), "");
+    EXPECT_EQ(faultOf(low, high, glm::vec2(1), glm::vec2(2e-7f)), "");
+    EXPECT_EQ(faultOf(low, high, glm::vec2(1), glm::vec2(-1e-4f)), "they leave 0..1");
+    EXPECT_EQ(faultOf(low, high, glm::vec2(1), glm::vec2(1e-4f)), "they leave 0..1");
+    EXPECT_EQ(faultOf(low, high, glm::vec2(std::nanf(""))), "they leave 0..1");
+}
+
 TEST(FileUv, PiecesShareNoCorner) {
     const Scene scene = twoSquares({0, 0}, {0.1f, 0.1f});  // at one corner they meet
     const SceneMesh& mesh = scene.meshes[0];
