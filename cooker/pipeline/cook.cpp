@@ -44,7 +44,8 @@ Key packKey(const Scene& scene, const Profile& profile, const CookOptions& optio
 
 // The pack of an earlier cook of the same.
 Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
-    auto pack = readPack(entry.pack);
+    MemorySource source(entry.pack);
+    auto pack = readPack(source);
     if (!pack) return std::unexpected(pack.error());
     result.pack = std::move(*pack);
     result.stats.warnings = std::move(entry.warnings);

@@ -2,15 +2,13 @@
 
 #include <pack/pack_data.h>
 #include <pack/pack_reader.h>
+#include <pack/pack_source.h>
 #include <probes/model_slots.h>
 
 #include <fmt/format.h>
 
-#include <cerrno>
-#include <exception>
-#include <fstream>
 #include <new>
-#include <system_error>
+#include <stdexcept>
 
 namespace dimmer {
 
@@ -19,39 +17,37 @@ Expected<Pack> Pack::fromData(PackData data) {
     return Pack(std::make_shared<const PackData>(std::move(data)));
 }
 
-Expected<Pack> Pack::fromBytes(std::span<const std::byte> bytes, std::string_view name) {
-    auto in_file = [&](const Error& error) { return Error{error.code, fmt::format("{}: {}", name, error.message)}; };
+namespace {
+
+Error inFile(std::string_view name, const Error& error) {
+    return {error.code, fmt::format("{}: {}", name, error.message)};
+}
+
+}  // namespace
+
+Expected<Pack> Pack::fromSource(PackSource& source, std::string_view name) {
     try {
-        auto data = readPack(bytes);
-        if (!data) return std::unexpected(in_file(data.error()));
+        auto data = readPack(source);
+        if (!data) return std::unexpected(inFile(name, data.error()));
         auto pack = fromData(std::move(*data));
-        if (!pack) return std::unexpected(in_file(pack.error()));
+        if (!pack) return std::unexpected(inFile(name, pack.error()));
         return pack;
     } catch (const std::bad_alloc&) {
-        return std::unexpected(in_file({ErrorCode::OutOfMemory, "there is no memory for what the pack holds"}));
+        return std::unexpected(inFile(name, {ErrorCode::OutOfMemory, "there is no memory for what the pack holds"}));
+    } catch (const std::length_error&) {  // a sparse file may claim any size
+        return std::unexpected(inFile(name, {ErrorCode::OutOfMemory, "there is no memory for what the pack holds"}));
     }
 }
 
+Expected<Pack> Pack::fromBytes(std::span<const std::byte> bytes, std::string_view name) {
+    MemorySource source(bytes);
+    return fromSource(source, name);
+}
+
 Expected<Pack> Pack::open(const std::filesystem::path& path) {
-    std::error_code error;
-    const auto size = std::filesystem::file_size(path, error);
-    std::ifstream file;
-    errno = 0;
-    if (!error) file.open(path, std::ios::binary);  // a pipe, which has no size, would block
-    if (!file.is_open()) {
-        if (!error) error.assign(errno, std::generic_category());
-        return fail(ErrorCode::Io, fmt::format("{}: the pack cannot be opened: {}", path.string(), error.message()));
-    }
-    std::vector<std::byte> bytes;
-    try {
-        bytes.resize(size);
-    } catch (const std::exception&) {  // a sparse file may claim any size
-        return fail(ErrorCode::OutOfMemory,
-                    fmt::format("{}: there is no memory for its {} bytes", path.string(), size));
-    }
-    if (!file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(size)))
-        return fail(ErrorCode::Io, fmt::format("{}: reading stopped before its end", path.string()));
-    return fromBytes(bytes, path.string());
+    auto source = FileSource::open(path);
+    if (!source) return std::unexpected(inFile(path.string(), source.error()));
+    return fromSource(*source, path.string());
 }
 
 std::span<const Element> Pack::elements() const {

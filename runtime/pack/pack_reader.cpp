@@ -50,7 +50,7 @@ std::string name(const Chunk& chunk) {
 
 class Reader {
    public:
-    explicit Reader(std::span<const std::byte> file) : file_(file) {}
+    explicit Reader(PackSource& file) : file_(file) {}
 
     Expected<PackData> read() {
         if (auto ok = readHeader(); !ok) return std::unexpected(ok.error());
@@ -91,7 +91,9 @@ class Reader {
     Expected<void> readHeader() {
         if (file_.size() < sizeof(header_))
             return bad("the file has {} bytes, less than a pack's header", file_.size());
-        std::memcpy(&header_, file_.data(), sizeof(header_));
+        const auto raw = file_.read(0, sizeof(header_));
+        if (!raw) return std::unexpected(raw.error());
+        std::memcpy(&header_, raw->data(), sizeof(header_));
         if (header_.magic != format::magic) return bad("this is not a Dimmer pack");
         if (header_.endian_tag != format::endian_tag) return bad("the pack's byte order is not little-endian");
         if (header_.version != format::version)
@@ -105,14 +107,14 @@ class Reader {
     }
 
     Expected<void> readTable() {
-        const auto body = file_.subspan(sizeof(header_));
-        if (header_.chunk_count > body.size() / sizeof(Chunk))
+        if (header_.chunk_count > (file_.size() - sizeof(header_)) / sizeof(Chunk))
             return bad("the table of {} chunks does not fit the file", header_.chunk_count);
-        const auto raw = body.first(header_.chunk_count * sizeof(Chunk));
-        if (format::headerHash(header_, raw) != header_.xxh64) return bad("the header or the chunk table is damaged");
+        const auto raw = file_.read(sizeof(header_), header_.chunk_count * sizeof(Chunk));
+        if (!raw) return std::unexpected(raw.error());
+        if (format::headerHash(header_, *raw) != header_.xxh64) return bad("the header or the chunk table is damaged");
         chunks_.resize(header_.chunk_count);
-        if (!raw.empty()) std::memcpy(chunks_.data(), raw.data(), raw.size());
-        const uint64_t table_end = sizeof(header_) + raw.size();
+        if (!raw->empty()) std::memcpy(chunks_.data(), raw->data(), raw->size());
+        const uint64_t table_end = sizeof(header_) + raw->size();
         for (const Chunk& c : chunks_) {
             if (c.offset < table_end || c.offset % format::chunk_alignment_bytes != 0)
                 return bad("chunk {} is misplaced", name(c));
@@ -198,9 +200,10 @@ class Reader {
         if (found == by_name_.end()) return bad("chunk {} is missing", name(type, subject));
         const Chunk& c = *found->second;
         by_name_.erase(found);
-        const auto stored = file_.subspan(c.offset, c.stored_bytes);
-        if (format::chunkHash(stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
-        auto shuffled = decompressor_.run(stored, c.real_bytes);
+        const auto stored = file_.read(c.offset, c.stored_bytes);
+        if (!stored) return std::unexpected(stored.error());
+        if (format::chunkHash(*stored) != c.xxh64) return bad("chunk {} is damaged", name(c));
+        auto shuffled = decompressor_.run(*stored, c.real_bytes);
         if (!shuffled) return bad("chunk {} does not hold the {} bytes that it states", name(c), c.real_bytes);
         return Shuffled{std::move(*shuffled), c.shuffle, (c.flags & format::chunk_delta) != 0};
     }
@@ -271,6 +274,7 @@ class Reader {
     }
 
     Expected<void> readPayload(PackData& d) {
+        d.payload.reserve(payloadLikely(d.contributions));
         for (uint32_t k = 0; k < d.contributions.size(); ++k) {
             const uint64_t receivers = d.contributions[k].receivers;
             if (receivers > d.addresses.size())
@@ -280,6 +284,17 @@ class Reader {
             if (!ok) return ok;
         }
         return {};
+    }
+
+    // Records that contributions state, but no more than what is stored could reasonably unfold to: without it the
+    // array would grow by halves and stand in memory twice while it does.
+    size_t payloadLikely(std::span<const Contribution> contributions) const {
+        constexpr uint64_t expansion_likely = 8;
+        uint64_t records = 0, stored_bytes = 0;
+        for (const Contribution& c : contributions) records += c.receivers;
+        for (const Chunk& c : chunks_)
+            if (c.type == static_cast<uint32_t>(ChunkType::Payload)) stored_bytes += c.stored_bytes;
+        return std::min(records, expansion_likely * stored_bytes / sizeof(TexelRecord));
     }
 
     Expected<void> readProbes(PackData& d) {
@@ -440,7 +455,7 @@ class Reader {
         }
     }
 
-    std::span<const std::byte> file_;
+    PackSource& file_;
     format::Header header_{};
     std::vector<Chunk> chunks_;
     std::map<std::pair<uint32_t, uint32_t>, const Chunk*> by_name_;  // type and subject; those not yet loaded
@@ -449,8 +464,8 @@ class Reader {
 
 }  // namespace
 
-Expected<PackData> readPack(std::span<const std::byte> bytes) {
-    return Reader(bytes).read();
+Expected<PackData> readPack(PackSource& source) {
+    return Reader(source).read();
 }
 
 }  // namespace dimmer

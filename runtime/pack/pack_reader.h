@@ -2,14 +2,13 @@
 #pragma once
 
 #include <pack/pack_data.h>
-
-#include <cstddef>
-#include <span>
+#include <pack/pack_source.h>
 
 namespace dimmer {
 
-// The chunks and tables are checked here, what they mean by validate(). Allocates no more than `bytes` can justify:
-// a chunk's real size is bounded by what its compressed frame can decode to.
-Expected<PackData> readPack(std::span<const std::byte> bytes);
+// The chunks and tables are checked here, what they mean by validate(). Allocates no more than the source can justify:
+// a chunk's real size is bounded by what its compressed frame can decode to. Beside what it returns there is one chunk
+// in memory at a time, as it is stored and as it decodes.
+Expected<PackData> readPack(PackSource& source);
 
 }  // namespace dimmer

@@ -19,6 +19,7 @@
 namespace dimmer {
 
 struct PackData;
+class PackSource;
 
 enum class ElementKind : uint32_t { LightSet = 0, Door = 1 };
 
@@ -78,7 +79,8 @@ struct Viewpoint {
 
 class Pack {
    public:
-    // Reads, decompresses and validates a whole file. Cost: one pass over the file. Errors name the chunk.
+    // Reads, decompresses and validates a whole file. Cost: one pass over the file, and in memory what it holds and,
+    // until it is there, one chunk of it. Errors name the chunk.
     static Expected<Pack> open(const std::filesystem::path& path);
     // The same from memory; `name` stands for the file in messages.
     static Expected<Pack> fromBytes(std::span<const std::byte> bytes, std::string_view name);
@@ -107,6 +109,7 @@ class Pack {
     const PackData& data() const { return *data_; }
 
    private:
+    static Expected<Pack> fromSource(PackSource& source, std::string_view name);
     explicit Pack(std::shared_ptr<const PackData> data) : data_(std::move(data)) {}
     std::shared_ptr<const PackData> data_;
 };
