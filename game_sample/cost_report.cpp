@@ -1,10 +1,11 @@
 #include "cost_report.h"
 
+#include "output_files.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 namespace dimmer::sample {
@@ -155,11 +156,7 @@ Expected<void> CostReport::writeJson(const std::filesystem::path& path, const st
     }
     json["total"] = toJson(total());
 
-    std::ofstream file(path);
-    file << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
-    file.close();
-    if (!file) return fail(ErrorCode::Io, fmt::format("{}: cannot be written.", path.string()));
-    return {};
+    return writeFile(path, json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + '\n');
 }
 
 }  // namespace dimmer::sample

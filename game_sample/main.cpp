@@ -1,5 +1,6 @@
 // dimmer-sample: a small game. Arguments in, exit code out; the work is in window_player.cpp and player.cpp.
 #include "balls.h"
+#include "output_files.h"
 #include "player.h"
 #include "window_player.h"
 
@@ -35,7 +36,8 @@ void declare(CLI::App& app, Arguments& arguments) {
     app.add_option("--script", arguments.script,
                    "What to play: a text file, see demo.script (default: nothing, every light set at 1)");
     app.add_flag("--headless", arguments.headless,
-                 "Play into pictures, frame_0000.png ... and cost.json in --out, instead of a window");
+                 "Play into pictures, frame_0000.png ... and cost.json in --out, instead of a window; those of an "
+                 "earlier run go");
     app.add_option("--out", arguments.out, "Folder for pictures (a window's: those taken by F12); made when missing")
         ->capture_default_str();
     app.add_option("--frames", arguments.frames,
@@ -56,13 +58,14 @@ void declare(CLI::App& app, Arguments& arguments) {
         "every light set and door, what each change costs, and limits; F1 hides it, F12 takes a picture, Esc quits.\n"
         "Examples: dimmer-sample house.dimmer\n"
         "          dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
-        "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage.");
+        "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 130 or 143 interrupted.");
 }
 
 // Where a standard stream is closed or its reader goes away, what is said is lost and the pictures are made: no file
 // of ours gets a stream's number, and no signal ends the work.
 void keepWorkingUnheard() {
     std::signal(SIGPIPE, SIG_IGN);
+    std::signal(SIGXFSZ, SIG_IGN);  // so that a write past a limit fails, and its file goes
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
         if (fcntl(stream, F_GETFD) < 0 && errno == EBADF)
             if (open("/dev/null", stream == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
@@ -153,8 +156,12 @@ int runInWindow(const Arguments& arguments, const Pack& pack, const Script& scri
 }
 
 int runHeadless(const Arguments& arguments, const Pack& pack, const Script& script) {
-    const auto played =
-        playHeadless(pack, script, {arguments.pack, arguments.out, arguments.validate, !arguments.no_self_visibility});
+    const auto played = playHeadless(pack, script,
+                                     {.pack = arguments.pack,
+                                      .script = arguments.script,
+                                      .out = arguments.out,
+                                      .validate = arguments.validate,
+                                      .self_visibility = !arguments.no_self_visibility});
     if (!played) return report(played.error());
     const std::string table = played->cost.table(played->device, played->driver);
     const bool printed = std::fputs(table.c_str(), stdout) >= 0 && std::fflush(stdout) == 0;
@@ -169,6 +176,8 @@ int run(const Arguments& arguments) {
     if (!pack) return report(pack.error());
     const auto script = prepareScript(arguments, *pack);
     if (!script) return report(script.error());
+    if (const auto ok = checkPicture(arguments.picture, {arguments.pack, arguments.script}); !ok)
+        return report(ok.error());
     return arguments.headless ? runHeadless(arguments, *pack, *script) : runInWindow(arguments, *pack, *script);
 }
 

@@ -2,6 +2,7 @@
 
 #include "exposure.h"
 #include "image_file.h"
+#include "output_files.h"
 #include "progress.h"
 #include "stage.h"
 #include "timeline.h"
@@ -12,10 +13,6 @@
 namespace dimmer::sample {
 
 Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const PlayOptions& options) {
-    std::error_code failed;
-    std::filesystem::create_directories(options.out, failed);
-    if (failed) return fail(ErrorCode::Io, fmt::format("{}: {}.", options.out.string(), failed.message()));
-
     const auto device = HeadlessDevice::create({.validation = options.validate, .graphics = true});
     if (!device) return std::unexpected(device.error());
     PlayResult result{{}, device->name(), device->driver(), {}};
@@ -23,6 +20,7 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
         auto stage = Stage::create(*device, pack, script, options.self_visibility);
         if (!stage) return std::unexpected(stage.error());
         DIMMER_TRY((*stage)->rehearse(script.frames));
+        DIMMER_TRY(prepareFolder(options.out, {options.pack, options.script}));
         Timeline timeline(script);
         AutoExposure eye(script.adaptation_s, script.fps);
         Progress progress("frames", script.frames);
@@ -34,11 +32,11 @@ Expected<PlayResult> playHeadless(const Pack& pack, const Script& script, const 
             result.cost.add({frame, std::move(*changes), *stats});
             const RadianceFrame radiance = (*stage)->read();
             const float exposure = eye.update(medianLuminance(radiance), frame == 0 || timeline.cut());
-            const auto file = options.out / fmt::format("frame_{:04}.png", frame);
-            DIMMER_TRY(writePng(file, radiance.width, radiance.height, developPicture(radiance, exposure)));
+            DIMMER_TRY(writePng(frameFile(options.out, frame), radiance.width, radiance.height,
+                                developPicture(radiance, exposure)));
             progress.update(frame + 1);
         }
-        DIMMER_TRY(result.cost.writeJson(options.out / "cost.json", options.pack.filename().string(), result.device,
+        DIMMER_TRY(result.cost.writeJson(costFile(options.out), options.pack.filename().string(), result.device,
                                          result.driver));
     }
     result.validation_messages = device->validationMessages();  // destruction was watched too

@@ -9,10 +9,10 @@
 namespace dimmer::sample {
 
 struct PlayOptions {
-    std::filesystem::path pack;
-    std::filesystem::path out;    // folder for frame_0000.png ... and cost.json; made when missing
-    bool validate = false;        // load the Vulkan validation layers
-    bool self_visibility = true;  // models' shadows on themselves
+    std::filesystem::path pack, script;  // never written over
+    std::filesystem::path out;           // folder for frame_0000.png ... and cost.json (output_files.h)
+    bool validate = false;               // load the Vulkan validation layers
+    bool self_visibility = true;         // models' shadows on themselves
 };
 
 struct PlayResult {

@@ -192,8 +192,15 @@ class Parser {
 
     Expected<void> set(Words& words, Action& action) {
         auto& set = action.emplace<SetState>();
-        set.state = words.rest();  // the whole rest: names in a state may hold spaces
+        std::string_view state = words.rest();  // the whole rest: names in a state may hold spaces
         words = Words({});
+        if (state.size() > 1 && state.find('"', 1) == state.size() - 1 && state.front() == '"')
+            state = trim(state.substr(1, state.size() - 2));
+        if (state.empty())
+            return fail(ErrorCode::BadInput,
+                        "set says no state; an example: set hall=0.5,door:front=1 (in quotes where a name begins with "
+                        "#)");
+        set.state = state;
         return rehearsal_.apply(set.state);
     }
 
@@ -295,6 +302,8 @@ class Parser {
 
 Expected<Script> parseScript(std::string_view text, std::string_view file, const Pack& pack) {
     Parser parser(pack, file);
+    if (constexpr std::string_view byte_order_mark = "\xef\xbb\xbf"; text.starts_with(byte_order_mark))
+        text.remove_prefix(byte_order_mark.size());
     while (!text.empty()) {
         const size_t end = std::min(text.find('\n'), text.size());
         if (auto done = parser.line(text.substr(0, end)); !done)

@@ -9,7 +9,7 @@
 //     camera VIEW                                  where it begins
 //     ball RADIUS X Y Z to X Y Z over FRAMES       metres: flies there and back as long as the script lasts
 //     probes RADIUS                                the light probes of the level's grid as spheres, metres
-//     at FRAME set STATE                           hall=0.5,alarm=1/0.2/0.2,door:front=1,all=0
+//     at FRAME set STATE                           hall=0.5,alarm=1/0.2/0.2,door:front=1,all=0; may be in quotes
 //     at FRAME fade NAME FROM TO over FRAMES       a light set, weights scalar or r/g/b, or door:NAME, 0..1
 //     at FRAME flicker NAME LOW HIGH for FRAMES seed N    times the weight that the set has then, 0..1
 //     at FRAME camera VIEW                         a cut: the eye has adapted to the new view

@@ -40,8 +40,11 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
                        if (light.bake == BakeMode::Full) stored[term].add(lux, weights);
                    });
     };
-    const auto addLight = [&](const PunctualLight& light, const SamplePoint& p, float share) {
+    // What lies in `beam` is found without points.
+    const auto addLight = [&](const PunctualLight& light, const SamplePoint& p, float share,
+                              const NarrowBeam* beam = nullptr) {
         const Illumination lit = illuminate(light, p.position_m);
+        if (beam && beam->holds(lit.towards_light)) return;
         const glm::vec3 direction = gatherer.toTangent(p, lit.towards_light);
         const float weight = Light::Intake::weight(direction);
         if (!(weight > 0) || !(luminance(lit.irradiance_lux) > 0)) return;
@@ -60,12 +63,13 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
     const glm::vec3 place = from.points[0].position_m;
     grid.forEach(place, [&](uint32_t l) {
         const PunctualLight& light = lights[l];
-        if (const auto beam = narrowBeam(gatherer, from, light)) {
-            for (const auto& [p, lux] : *beam) {
+        const auto beam = narrowBeam(gatherer, from, light);
+        if (beam) {
+            for (const auto& [p, lux] : beam->places) {
                 const Illumination lit = illuminate(light, p.position_m);
                 addArriving(light, p, lit, gatherer.toTangent(p, lit.towards_light), lux);
             }
-            return;
+            if (light.type == LightType::Spot) return;  // that is all of it
         }
         const float scale = scaleOf(light);
         const uint32_t first = hash(grid.identity(l), from.id) % points;
@@ -74,7 +78,8 @@ uint64_t directLight(const Gatherer& gatherer, const LightGrid& grid, const Gath
                          glm::distance(light.position_m, place) < near_m;
         const uint32_t used = scale != 1 ? points : all ? std::min(points, points_max) : 1;
         for (uint32_t i = 0; i < used; ++i)
-            addLight(light, from.points[(first + i) % points], scale / static_cast<float>(used));
+            addLight(light, from.points[(first + i) % points], scale / static_cast<float>(used),
+                     beam ? &*beam : nullptr);
     });
     return traced;
 }

@@ -32,16 +32,16 @@ std::optional<glm::dvec3> landing(const TexelPiece& piece, glm::dvec3 from, glm:
 }
 
 // Directions spread over the cone, the same for all texels.
-std::vector<BeamPlace> landedIn(const TexelPieces& pieces, const PunctualLight& light) {
+std::vector<BeamPlace> landedIn(const TexelPieces& pieces, const PunctualLight& light, glm::vec3 axis, float cosine) {
     glm::vec3 u, v;
-    orthonormalBasis(light.direction, u, v);
-    const float solid_angle_sr = 2 * pi * (1 - light.cone_outer_cos) / beam_directions;
+    orthonormalBasis(axis, u, v);
+    const float solid_angle_sr = 2 * pi * (1 - cosine) / beam_directions;
     std::vector<BeamPlace> landed;
     for (uint32_t i = 0; i < beam_directions; ++i) {
         const glm::vec2 square = sequence2d(i, 0);
-        const float along = 1 - square.x * (1 - light.cone_outer_cos), across = std::sqrt(1 - along * along),
+        const float along = 1 - square.x * (1 - cosine), across = std::sqrt(1 - along * along),
                     angle = 2 * pi * square.y;
-        const glm::dvec3 direction(along * light.direction + across * (std::cos(angle) * u + std::sin(angle) * v));
+        const glm::dvec3 direction(along * axis + across * (std::cos(angle) * u + std::sin(angle) * v));
         for (const TexelPiece& piece : pieces.pieces()) {
             const auto p = landing(piece, glm::dvec3(light.position_m), direction);
             if (!p) continue;
@@ -61,22 +61,27 @@ std::vector<BeamPlace> landedIn(const TexelPieces& pieces, const PunctualLight& 
 
 }  // namespace
 
-std::optional<std::vector<BeamPlace>> narrowBeam(const Gatherer& gatherer, const GatherFrom& from,
-                                                 const PunctualLight& light) {
-    if (light.type != LightType::Spot || from.texel == no_index || light.cone_outer_cos < beam_cos_min)
-        return std::nullopt;
+std::optional<NarrowBeam> narrowBeam(const Gatherer& gatherer, const GatherFrom& from, const PunctualLight& light) {
+    const BeamCones beam = beamCones(light);
+    if (from.texel == no_index || beam.cosines.empty()) return std::nullopt;
     const float width_m = std::sqrt(gatherer.texels().area_m2[from.texel]);
     const glm::vec3 to_texel = from.points[0].position_m - light.position_m;
-    const float along_m = glm::dot(to_texel, light.direction);
-    const float radius_m = along_m * std::sqrt(1 - light.cone_outer_cos * light.cone_outer_cos) / light.cone_outer_cos;
-    if (radius_m > narrow_widths * width_m) return std::nullopt;
+    const float along_m = glm::dot(to_texel, beam.axis);
+    const auto radiusM = [&](float cosine) { return along_m * std::sqrt(1 - cosine * cosine) / cosine; };
+    const auto isNarrow = [&](float cosine) {
+        return cosine >= beam_cos_min && radiusM(cosine) <= narrow_widths * width_m;
+    };
+    const auto widest = std::find_if(beam.cosines.rbegin(), beam.cosines.rend(), isNarrow);
+    if (widest == beam.cosines.rend()) return std::nullopt;
+    NarrowBeam found{beam.axis, *widest, {}};
     // Past all of the texel, within which the radius changes by no more than its length; or behind the lamp.
-    const float off_axis_m = glm::length(to_texel - along_m * light.direction);
+    const float off_axis_m = glm::length(to_texel - along_m * beam.axis);
     const float reach_m = 2 * narrow_widths * width_m;
-    if (off_axis_m > radius_m + reach_m || along_m < -reach_m) return std::vector<BeamPlace>{};
+    if (off_axis_m > radiusM(*widest) + reach_m || along_m < -reach_m) return found;
     const TexelPieces pieces(gatherer, from);
     if (!(pieces.areaM2() > 0)) return std::nullopt;
-    return landedIn(pieces, light);
+    found.places = landedIn(pieces, light, beam.axis, *widest);
+    return found;
 }
 
 }  // namespace dimmer::cook

@@ -27,6 +27,13 @@ float cone(const PunctualLight& light, glm::vec3 towards_light) {
 
 }  // namespace
 
+BeamCones beamCones(const PunctualLight& light) {
+    if (light.profile)
+        return {glm::transpose(light.profile_from_world) * light.profile->beam_axis, light.profile->beam_cos};
+    if (light.type == LightType::Spot) return {light.direction, {&light.cone_outer_cos, 1}};
+    return {};
+}
+
 Illumination illuminate(const PunctualLight& light, glm::vec3 point) {
     if (light.type == LightType::Directional)
         return {-light.direction, std::numeric_limits<float>::infinity(), light.intensity};

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <span>
 
 namespace dimmer::cook {
 
@@ -26,6 +27,14 @@ inline constexpr float lamp_lift_m = 5e-4f;
 inline float shadowRayLengthM(const Illumination& lit) {
     return std::isinf(lit.distance_m) ? far_away_m : std::max(0.0f, lit.distance_m - lamp_lift_m);
 }
+
+// The cones that a lamp's light is narrow in, about an axis: cosines of their half angles, from the narrowest on. A
+// spot has one, which holds all of it; a measured luminaire as many as its profile's beam.
+struct BeamCones {
+    glm::vec3 axis{0, 0, -1};
+    std::span<const float> cosines;
+};
+BeamCones beamCones(const PunctualLight& light);
 
 // What `light` does at `point`. Inverse square with a least distance of 1 mm, windowed by the range; spots by the glTF
 // cone formula (KHR_lights_punctual); measured luminaires by their profile (EXT_lights_ies).

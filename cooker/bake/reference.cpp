@@ -39,18 +39,34 @@ uint32_t pick(const std::vector<float>& weights, float target) {
     return i;
 }
 
-// What a point light or spot shines into, steradians; directions are uniform over it.
-float solidAngle(const PunctualLight& light) {
-    return light.type == LightType::Spot ? 2 * pi * (1 - light.cone_outer_cos) : 4 * pi;
+// Where a lamp that is no spot shines besides its beam: all around.
+size_t besidesBeam(const PunctualLight& light) {
+    return light.type == LightType::Spot ? 0 : 1;
 }
 
+// Even over one of its cones or, of what is no spot, all around; each of these as often as the others.
 glm::vec3 lampDirection(const PunctualLight& light, glm::vec2 u) {
-    if (light.type != LightType::Spot) return uniformSphereDirection(u);
-    const float z = 1 - u.x * (1 - light.cone_outer_cos);
+    const BeamCones beam = beamCones(light);
+    const size_t choices = beam.cosines.size() + besidesBeam(light);
+    u.x *= static_cast<float>(choices);
+    const size_t choice = std::min(static_cast<size_t>(u.x), choices - 1);
+    u.x -= static_cast<float>(choice);
+    if (choice == beam.cosines.size()) return uniformSphereDirection(u);
+    const float z = 1 - u.x * (1 - beam.cosines[choice]);
     const float radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
     glm::vec3 t, b;
-    orthonormalBasis(light.direction, t, b);
-    return t * (radius * std::cos(phi)) + b * (radius * std::sin(phi)) + light.direction * z;
+    orthonormalBasis(beam.axis, t, b);
+    return t * (radius * std::cos(phi)) + b * (radius * std::sin(phi)) + beam.axis * z;
+}
+
+// The density per steradian with which lampDirection() finds a direction.
+float lampDirectionPdf(const PunctualLight& light, glm::vec3 away) {
+    const BeamCones beam = beamCones(light);
+    const size_t besides = besidesBeam(light);
+    float sum = static_cast<float>(besides) / (4 * pi);
+    for (const float cosine : beam.cosines)
+        if (glm::dot(beam.axis, away) >= cosine) sum += 1 / (2 * pi * (1 - cosine));
+    return sum / static_cast<float>(beam.cosines.size() + besides);
 }
 
 uint32_t hashOf(glm::vec3 v, uint32_t seed) {
@@ -214,10 +230,9 @@ float ReferenceTracer::lampPdf(const Vertex& from, uint32_t lamp, const Vertex& 
     const float distance2 = glm::dot(to_lamp, to_lamp);
     if (!(distance2 > 0)) return 0;
     const glm::vec3 direction = to_lamp / std::sqrt(distance2);
-    if (light.type == LightType::Spot && glm::dot(light.direction, -direction) < light.cone_outer_cos) return 0;
     const float choice = s.power[lamp] / std::max(glm::dot(apart, apart), s.least_distance2[lamp]);
-    return choice / from.lamp_weight_sum * std::max(glm::dot(lit.normal, direction), 0.0f) /
-           (solidAngle(light) * distance2);
+    return choice / from.lamp_weight_sum * std::max(glm::dot(lit.normal, direction), 0.0f) *
+           lampDirectionPdf(light, -direction) / distance2;
 }
 
 // Light of lamps that reaches `vertex` after one bounce: a lamp is picked, it shines somewhere, and that place is

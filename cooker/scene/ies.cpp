@@ -281,6 +281,70 @@ Place locate(const std::vector<float>& angles, float angle) {
 
 }  // namespace
 
+namespace {
+
+constexpr std::array<float, 7> beam_shares = {0.5f, 0.2f, 0.1f, 0.05f, 0.02f, 0.01f, 0};
+constexpr float beam_cos_min = std::numbers::sqrt2_v<float> / 2;
+constexpr int beam_columns = 32;  // all around, beside the file's own
+
+glm::vec3 directionOf(float vertical_deg, float horizontal_deg) {
+    const float v = vertical_deg / deg_per_rad, h = horizontal_deg / deg_per_rad;
+    return {std::sin(v) * std::cos(h), std::sin(v) * std::sin(h), -std::cos(v)};
+}
+
+// Where what is brighter than half of the peak goes to in the mean.
+glm::vec3 axisOf(const LightProfile& p) {
+    const std::vector<float>& v = p.vertical_deg;
+    glm::vec3 sum(0), brightest(0, 0, -1);
+    float most = 0;
+    for (size_t i = 0; i < v.size(); ++i) {
+        const float width_deg = v[std::min(i + 1, v.size() - 1)] - v[i == 0 ? 0 : i - 1];
+        for (int k = 0; k < beam_columns; ++k) {
+            const glm::vec3 direction = directionOf(v[i], 360.0f / beam_columns * static_cast<float>(k));
+            const float share = p.shareTowards(direction);
+            if (share > most) most = share, brightest = direction;
+            if (share > beam_shares[0]) sum += direction * (share * width_deg * std::sin(v[i] / deg_per_rad));
+        }
+    }
+    return glm::length(sum) > 0 ? glm::normalize(sum) : brightest;
+}
+
+// Cosines of the cones about the axis that hold all that is brighter than each of beam_shares.
+std::array<float, beam_shares.size()> coneCosines(const LightProfile& p) {
+    std::vector<float> columns = p.horizontal_deg;
+    for (int k = 0; k <= beam_columns; ++k) columns.push_back(360.0f / beam_columns * static_cast<float>(k));
+    std::ranges::sort(columns);
+    const std::vector<float>& v = p.vertical_deg;
+    const size_t rows = v.size();
+    std::vector<float> shares;
+    for (const float h : columns)
+        for (const float angle : v) shares.push_back(p.shareTowards(directionOf(angle, h)));
+    std::array<float, beam_shares.size()> cosines;
+    cosines.fill(1);
+    for (size_t c = 0; c < columns.size(); ++c)
+        for (size_t i = 0; i < rows; ++i) {
+            float share = 0;  // between it and its neighbours it may be brighter than it is itself
+            for (size_t d = c == 0 ? 0 : c - 1; d <= std::min(c + 1, columns.size() - 1); ++d)
+                for (size_t k = i == 0 ? 0 : i - 1; k <= std::min(i + 1, rows - 1); ++k)
+                    share = std::max(share, shares[d * rows + k]);
+            const float cosine = glm::dot(directionOf(v[i], columns[c]), p.beam_axis);
+            for (size_t k = 0; k < cosines.size(); ++k)
+                if (share > beam_shares[k]) cosines[k] = std::min(cosines[k], cosine);
+        }
+    return cosines;
+}
+
+void findBeam(LightProfile& p) {
+    p.beam_axis = axisOf(p);
+    for (const float cosine : coneCosines(p)) {
+        const float wider = std::cos(std::acos(std::min(cosine, 1.0f)) + 2 * rim_deg / deg_per_rad);
+        if (wider < beam_cos_min) break;
+        if (p.beam_cos.empty() || wider < p.beam_cos.back()) p.beam_cos.push_back(wider);
+    }
+}
+
+}  // namespace
+
 float LightProfile::shareTowards(glm::vec3 direction) const {
     // Not acos, which loses the angle near the axis.
     const float vertical = std::atan2(glm::length(glm::vec2(direction)), -direction.z) * deg_per_rad;
@@ -294,7 +358,9 @@ float LightProfile::shareTowards(glm::vec3 direction) const {
 }
 
 Expected<LightProfileFile> parseLightProfile(std::string_view text, const std::string& file) {
-    return Parser(text, file).run();
+    auto parsed = Parser(text, file).run();
+    if (parsed) findBeam(parsed->profile);
+    return parsed;
 }
 
 }  // namespace dimmer::cook

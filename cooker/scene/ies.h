@@ -17,6 +17,10 @@ struct LightProfile {
     std::vector<float> horizontal_deg;  // ascending; symmetries are unfolded, so that they span 0..360 at least
     std::vector<float> share;           // of peak_cd, 0..1; all vertical angles of the first horizontal one, and so on
     float peak_cd = 0;                  // with all the factors that the file states
+    // A narrow beam, if it has one: cones about an axis, from the narrowest on, outside of which all is darker than a
+    // half of the peak, a fifth, and so on; cosines of their half angles, of those below 45 degrees.
+    glm::vec3 beam_axis{0, 0, -1};
+    std::vector<float> beam_cos = {};
 
     // Share of the peak towards a unit direction, bilinear in the two angles.
     float shareTowards(glm::vec3 direction) const;

@@ -1,9 +1,12 @@
 // Spots whose beam is narrower than a few texels: all that they send arrives, where it should.
 #include <bake/baked_scene.h>
 #include <bake/test_scenes.h>
+#include <fmt/format.h>
+#include <scene/ies.h>
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 namespace dimmer::cook::test {
 namespace {
@@ -75,6 +78,64 @@ TEST(NarrowBeams, LightTheTexelThatTheyLandIn) {
         EXPECT_NEAR(static_cast<double>(b.lux(i).y), sentLm(scene) / (0.25 * 0.25), 1e-3 * sentLm(scene) / 0.0625);
     }
     EXPECT_EQ(lit, 1u);
+}
+
+// A luminaire whose intensity falls with the angle as a bell does, to half of its peak at `half_deg`, and about it a
+// faint light everywhere below. Straight between whole and half degrees, as the file has it.
+struct Bell {
+    double half_deg, faint;
+    double shareAt(double v_deg) const { return faint + (1 - faint) * std::exp2(-v_deg * v_deg / half_deg / half_deg); }
+
+    std::shared_ptr<const LightProfile> profile() const {
+        std::string text = fmt::format("IESNA:LM-63-2002\nTILT=NONE\n1 -1 1 {} 1 1 2 0 0 0\n1 1 20\n", steps + 1);
+        for (int i = 0; i <= steps; ++i) text += fmt::format("{} ", 90.0 * i / steps);
+        text += "\n0\n";
+        for (int i = 0; i <= steps; ++i) text += fmt::format("{} ", shareAt(90.0 * i / steps));
+        auto parsed = parseLightProfile(text, "bell.ies");
+        EXPECT_TRUE(parsed) << parsed.error().message;
+        return std::make_shared<const LightProfile>(std::move(parsed->profile));
+    }
+    // Within `end_deg` of the axis, by the midpoint rule.
+    double sentLm(double end_deg) const {
+        constexpr int parts = 40;  // of a step
+        double sum = 0;
+        for (int i = 0; i < steps * parts; ++i) {
+            const double at = (i + 0.5) / parts, step_deg = 90.0 / steps, deg = at * step_deg;
+            if (deg > end_deg) break;
+            const double low = std::floor(at), part = at - low;
+            const double share = (1 - part) * shareAt(low * step_deg) + part * shareAt((low + 1) * step_deg);
+            sum += share * std::sin(deg * pi_d / 180) * step_deg / parts * pi_d / 180;
+        }
+        return static_cast<double>(spot_cd) * 2 * pi_d * sum;
+    }
+    static constexpr int steps = 180;
+};
+
+// Of beams a third of a texel across to three: eight points a texel found between a tenth and twice of it. A hundredth
+// of the peak all around is no beam, and is found by points: they tell a disk's edge to a tenth of a texel.
+TEST(NarrowBeams, OfMeasuredLuminairesArrive) {
+    for (const double faint : {0.0, 0.015})
+        for (const double half_deg : {2.0, 5.0, 12.0})
+            for (const glm::vec2 at : {glm::vec2(0.1f, 0.07f), {0.25f, -0.5f}, {0.37f, 0.21f}}) {
+                constexpr float lamp_m = 0.5f, floor_m = 3;
+                const Bell bell{half_deg, faint};
+                Scene scene;
+                addFloor(scene, floor_m, addMaterial(scene, lambert(0)));
+                PunctualLight& lamp = addPointLight(scene, {at.x, lamp_m, at.y}, spot_cd, BakeMode::Full);
+                lamp.profile = bell.profile();
+                lamp.direction = {0, -1, 0};
+                // Its nadir is -Z; here it shines down. The floor's rim cuts off what is faint: all within 2.4 m lands.
+                lamp.profile_from_world = glm::mat3({1, 0, 0}, {0, 0, 1}, {0, -1, 0});
+                BakedScene b(scene);
+                b.bake({.final_rays = 32});
+                double found = 0;
+                const double end_m = 2;
+                for (size_t i = 0; i < b.texels.size(); ++i)
+                    if (glm::distance(glm::vec2(b.place(i).x, b.place(i).z), at) < end_m)
+                        found += static_cast<double>(b.lux(i).y) * static_cast<double>(b.texels.area_m2[i]);
+                const double sent = bell.sentLm(std::atan(end_m / static_cast<double>(lamp_m)) * 180 / pi_d);
+                EXPECT_NEAR(found / sent, 1, 0.02) << half_deg << " " << faint << " " << at.x;
+            }
 }
 
 // Half of a beam falls on a plate: of 1,024 directions half do, but for some ten at its edge.

@@ -3,7 +3,9 @@
 #include <bake/reference.h>
 #include <bake/test_scenes.h>
 #include <gtest/gtest.h>
+#include <scene/ies.h>
 
+#include <memory>
 #include <random>
 
 namespace dimmer::cook::test {
@@ -35,6 +37,31 @@ TEST(Reference, PointLightOverAPlaneFollowsTheInverseSquare) {
     }
     scene.lights[0].bake = BakeMode::Indirect;  // its direct light is the renderer's
     EXPECT_EQ(trace(scene, {0, 0, 0}, up, 16).irradiance_lux, glm::vec3(0));
+}
+
+// The same beam as a spot and as a measured luminaire, whose directions were drawn from all around: off a floor of 0.8
+// to a point beside the lamp.
+TEST(Reference, ANarrowLuminaireIsAsQuietAsASpot) {
+    constexpr double half_deg = 2;
+    Scene scene;
+    addFloor(scene, 20, addMaterial(scene, lambert(0.8f)));
+    PunctualLight& lamp = addPointLight(scene, {0, 2, 0}, 1000, BakeMode::Indirect);
+    lamp.type = LightType::Spot;
+    lamp.direction = {0, -1, 0};
+    lamp.cone_outer_cos = lamp.cone_inner_cos = static_cast<float>(std::cos(half_deg * pi_d / 180));
+    const glm::vec3 eye(1, 1, 0), down(0, -1, 0);
+    const ReferenceValue spot = trace(scene, eye, down, 20000);
+    auto parsed = parseLightProfile("TILT=NONE\n1 -1 1 3 1 1 2 0 0 0\n1 1 20\n0 2 2.0001\n0\n1 1 0\n", "beam.ies");
+    ASSERT_TRUE(parsed) << parsed.error().message;
+    lamp.type = LightType::Point;
+    lamp.profile = std::make_shared<const LightProfile>(std::move(parsed->profile));
+    lamp.profile_from_world = glm::mat3({1, 0, 0}, {0, 0, 1}, {0, -1, 0});
+    const ReferenceValue luminaire = trace(scene, eye, down, 20000);
+    // The floats of two degrees' cosine are good to 1e-4 of the beam.
+    expectLux(luminaire, static_cast<double>(spot.irradiance_lux.x), 0.02);
+    // E = rho / pi * flux * the form factor from there.
+    const double flux = 1000 * 2 * pi_d * (1 - std::cos(half_deg * pi_d / 180));
+    expectLux(spot, 0.8 / pi_d * flux * (1.0 / std::sqrt(2)) * (1.0 / std::sqrt(2)) / 2, 0.02);
 }
 
 // A lamp millimetres over a floor lays half of its light on it: what comes back is that of one at a few centimetres.

@@ -242,7 +242,8 @@ TEST_F(SamplePlayer, WritesPicturesAndCosts) {
     ASSERT_TRUE(script) << script.error().message;
     const auto out = std::filesystem::path(testing::TempDir()) / "dimmer_sample_player";
     std::filesystem::remove_all(out);
-    const auto played = playHeadless(*pack, *script, {"wall.dimmer", out, true});
+    const auto played =
+        playHeadless(*pack, *script, {.pack = "wall.dimmer", .script = {}, .out = out, .validate = true});
     ASSERT_TRUE(played) << played.error().message;
     EXPECT_TRUE(played->validation_messages.empty()) << played->validation_messages.front();
 

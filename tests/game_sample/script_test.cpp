@@ -159,5 +159,18 @@ TEST(SampleScript, CommentsBeginWords) {
     EXPECT_THAT(parseError("camera \"cam #2\""), HasSubstr("cam #2"));
 }
 
+// A name that begins with '#' was taken for a comment, and the step for one that says nothing.
+TEST(SampleScript, StatesMayBeInQuotes) {
+    const auto stateOf = [](const Script& script) { return std::get<SetState>(script.steps.at(0).action).state; };
+    EXPECT_EQ(stateOf(parse("at 0 set \"hall=0.5, alarm=2\" # dim")), "hall=0.5, alarm=2");
+    EXPECT_THAT(parseError("at 0 set \"#hall=1\""), HasSubstr("#hall"));
+    for (const char* nothing : {"at 0 set", "at 0 set \"\"", "at 0 set #hall=0"})
+        EXPECT_THAT(parseError(nothing), HasSubstr("in quotes")) << nothing;
+}
+
+TEST(SampleScript, ByteOrderMarksAreNone) {
+    EXPECT_EQ(parse("\xef\xbb\xbf# begins\nframes 7").frames, 7u);
+}
+
 }  // namespace
 }  // namespace dimmer::sample

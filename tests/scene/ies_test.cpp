@@ -3,6 +3,7 @@
 #include <scene/expectations.h>
 #include <scene/ies.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 #include <random>
@@ -50,6 +51,37 @@ double candelaAt(const LightProfile& p, double vertical_deg, double horizontal_d
 
 // Float angles are good to 1e-5 degrees; values here change by at most a few candela per degree.
 constexpr double tolerance_cd = 1e-3;
+
+// Cones about the brightest, outside of which all is darker than a half of the peak, a fifth and so on.
+TEST(SceneIesFile, NarrowBeamsAreFound) {
+    const auto degrees = [](float cosine) { return std::acos(static_cast<double>(cosine)) / rad_per_deg; };
+    Ies narrow;
+    narrow.vertical = {0, 4, 8, 12, 40, 90};
+    narrow.candela = {1000, 1000, 300, 70, 3, 0};
+    const LightProfile beam = parsed(narrow.text());
+    expectNear(beam.beam_axis, {0, 0, -1});
+    // A half within the angle that follows 4 degrees, and so on; what is below a hundredth reaches too far to be a
+    // beam.
+    std::vector<double> found;
+    for (const float cosine : beam.beam_cos) found.push_back(degrees(cosine));
+    const std::array wanted_deg = {8.0, 12.0, 40.0};
+    ASSERT_EQ(found.size(), wanted_deg.size());
+    for (size_t i = 0; i < 3; ++i) EXPECT_NEAR(found[i], wanted_deg[i], 0.01);
+
+    Ies aside = narrow;  // one of four horizontal angles, 60 degrees from the nadir
+    aside.vertical = {0, 55, 60, 65, 90};
+    aside.horizontal = {0, 80, 90, 100, 360};
+    aside.candela = {};
+    for (int h = 0; h < 5; ++h)
+        for (int v = 0; v < 5; ++v) aside.candela.push_back(h == 2 && v == 2 ? 1000 : 0);
+    const LightProfile to_y = parsed(aside.text());
+    EXPECT_LT(glm::distance(to_y.beam_axis, towards(60, 90)), 0.05f);
+    ASSERT_EQ(to_y.beam_cos.size(), 1u);
+    // Its corners are 5 degrees up and 10 aside.
+    EXPECT_NEAR(degrees(to_y.beam_cos[0]), 10, 2.5);
+
+    EXPECT_TRUE(parsed(Ies().text()).beam_cos.empty());  // 60 of 100 at 45 degrees
+}
 
 TEST(SceneIesFile, AllFiveHeaders) {
     for (const char* header : {"", "my lamp\nsome label\n", "IESNA91\n[TEST] x\n", "IESNA:LM-63-1995\n[LUMCAT] y\n",
