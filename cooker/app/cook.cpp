@@ -165,10 +165,6 @@ Expected<void> checkArguments(const CookArguments& a) {
     return {};
 }
 
-void sayWarnings(std::span<const std::string> warnings) {
-    for (const std::string& w : warnings) sayMessage("warning: " + w);
-}
-
 // What is written beside the pack.
 Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
     if (!a.write_level.empty()) {

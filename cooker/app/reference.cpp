@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/files.h>
+#include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/level_files.h>
 #include <pipeline/reference_state.h>
@@ -39,6 +40,7 @@ int run(const ReferenceArguments& a) {
     if (auto ok = checkFiles(inputs, {printed("--output", a.output)}); !ok) return reportError(ok.error());
     const auto scene = importLevel(a.level);
     if (!scene) return reportError(scene.error());
+    sayWarnings(scene->warnings);
     const auto state = readReferenceState(*scene, a.state);
     if (!state) return reportError(state.error());
     const auto points = readPoints(a.points);

@@ -26,6 +26,10 @@ void sayMessage(std::string_view message) noexcept {
     funlockfile(stderr);
 }
 
+void sayWarnings(std::span<const std::string> warnings) {
+    for (const std::string& warning : warnings) sayMessage("warning: " + warning);
+}
+
 void keepClosedStreamsClosed() noexcept {
     // open() takes the lowest free number. Each stream gets the direction that it is not used in.
     for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})

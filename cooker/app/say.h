@@ -1,6 +1,8 @@
 // What goes to stderr. Where that is closed or full it is lost and the work goes on: nothing here throws.
 #pragma once
 
+#include <span>
+#include <string>
 #include <string_view>
 
 namespace dimmer::cook {
@@ -10,6 +12,8 @@ void say(std::string_view text) noexcept;
 
 // A message: every line of it on its own, behind "dimmer: ", so that it can be told from lines of progress.
 void sayMessage(std::string_view message) noexcept;
+
+void sayWarnings(std::span<const std::string> warnings);
 
 // Takes the places of standard streams that the caller closed, so that no file which is opened later gets one of their
 // numbers and what is printed. Using them stays an error. To be called before any file is opened.

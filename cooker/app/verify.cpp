@@ -168,6 +168,11 @@ int run(VerifyArguments a) {
     if (!scene) return reportError(scene.error());
     const auto pack = Pack::open(a.pack);
     if (!pack) return reportError(pack.error());
+    if (!scene->warnings.empty())
+        sayMessage(
+            fmt::format("warning: {}: what was mended or left out of the level, in {} places as `dimmer cook` "
+                        "says, is so for the reference too; the figures know nothing of it",
+                        a.level, scene->warnings.size()));
     if (const std::string node = nodeThatDiffers(*scene, pack->meshes()); !node.empty())
         sayMessage(
             fmt::format("warning: {}: its node '{}' is not where {} has it, or is not there: the pack is of "

@@ -1,6 +1,7 @@
 #include <bake/emitters.h>
 
 #include <bake/sampling.h>
+#include <scene/emission.h>
 
 #include <tbb/parallel_for.h>
 
@@ -73,16 +74,16 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     emitter_of_.assign(rays.triangles().size(), UINT32_MAX);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const LevelTriangle& triangle = rays.triangles()[t];
-        const Material& material = scene.materials[triangle.material];
-        if (material.emission_cd_m2 == glm::vec3(0)) continue;
+        const glm::vec3 radiance_cd_m2 = emissionOf(scene, scene.meshes[triangle.mesh], triangle.triangle);
+        if (radiance_cd_m2 == glm::vec3(0)) continue;
         Emitter e{.triangle = t,
                   .group = mesh_groups[triangle.mesh],
                   .corner = rays.corner(t, 0),
                   .edge1 = rays.corner(t, 1) - rays.corner(t, 0),
                   .edge2 = rays.corner(t, 2) - rays.corner(t, 0),
                   .normal = triangle.normal,
-                  .radiance_cd_m2 = material.emission_cd_m2,
-                  .double_sided = material.double_sided};
+                  .radiance_cd_m2 = radiance_cd_m2,
+                  .double_sided = scene.materials[triangle.material].double_sided};
         e.area_m2 = 0.5f * glm::length(glm::cross(e.edge1, e.edge2));
         emitters_.push_back(e);
     }

@@ -3,6 +3,7 @@
 #include <bake/punctual.h>
 #include <bake/sampling.h>
 #include <bake/sky.h>
+#include <scene/emission.h>
 
 #include <algorithm>
 #include <bit>
@@ -164,8 +165,8 @@ ReferenceTracer::ReferenceTracer(const RayScene& rays, const ReferenceOptions& o
     area_light_of_.assign(rays.triangles().size(), none);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
         const LevelTriangle& triangle = rays.triangles()[t];
-        const glm::vec3 radiance =
-            scene.materials[triangle.material].emission_cd_m2 * weightOf(scene.meshes[triangle.mesh].light_set);
+        const SceneMesh& mesh = scene.meshes[triangle.mesh];
+        const glm::vec3 radiance = emissionOf(scene, mesh, triangle.triangle) * weightOf(mesh.light_set);
         if (!(luminance(radiance) > 0)) continue;
         const glm::vec3 a = rays.corner(t, 0);
         const float area = 0.5f * glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a));

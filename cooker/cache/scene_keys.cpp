@@ -1,5 +1,6 @@
 #include <cache/scene_keys.h>
 
+#include <scene/emission.h>
 #include <scene/ies.h>
 
 #include <map>
@@ -193,7 +194,7 @@ Key lampsKey(const Scene& scene, uint32_t group) {
         if (groupOf(mesh.light_set) != group) continue;
         glm::vec3 last(0);
         for (uint32_t t = 0; t < mesh.triangle_materials.size(); ++t) {
-            const glm::vec3 emission = scene.materials[mesh.triangle_materials[t]].emission_cd_m2;
+            const glm::vec3 emission = emissionOf(scene, mesh, t);
             if (emission == last) continue;
             add(key.add(m).add(t), emission);
             last = emission;
@@ -211,8 +212,7 @@ Key sceneRaysKey(const Key& charts, const Key& settings, const Scene& scene) {
     key.add(charts).add(settings);
     for (uint32_t m = 0; m < scene.meshes.size(); ++m)
         for (uint32_t t = 0; t < scene.meshes[m].triangle_materials.size(); ++t)
-            if (scene.materials[scene.meshes[m].triangle_materials[t]].emission_cd_m2 != glm::vec3(0))
-                key.add(m).add(t);
+            if (emissionOf(scene, scene.meshes[m], t) != glm::vec3(0)) key.add(m).add(t);
     return key.finish();
 }
 

@@ -141,12 +141,17 @@ glm::vec3 stepOf(const SceneModel& model, int axis) {
 }  // namespace
 
 void chooseLighting(Scene& scene) {
+    std::vector<SceneMesh*> by_grids;
     for (SceneMesh& mesh : scene.meshes) {
         if (mesh.lighting != Lighting::Automatic) continue;
         const bool grid =
             !mesh.door && !mesh.light_set && mesh.uv1.empty() && fallsApart(scene, mesh) && hangsTogether(mesh);
         mesh.lighting = grid ? Lighting::LocalGrid : Lighting::Lightmap;
+        if (grid) by_grids.push_back(&mesh);
     }
+    // A room that is all curves is no model.
+    if (std::ranges::none_of(scene.meshes, hasLightmap))
+        for (SceneMesh* mesh : by_grids) mesh->lighting = Lighting::Lightmap;
 }
 
 void listModels(Scene& scene, const ModelSettings& settings) {

@@ -13,7 +13,8 @@ namespace dimmer::cook {
 // Decides for meshes that leave it to us (Lighting::Automatic): a lightmap, but for those that fall into many charts of
 // which the mean is smaller than a hand's breadth squared, and hang together. By geometry alone, so that no setting
 // changes the choice.
-// Leaves of doors, what shines and what brings UVs of its own keep lightmaps.
+// Leaves of doors, what shines and what brings UVs of its own keep lightmaps, and so do all where nothing else would
+// have one.
 void chooseLighting(Scene& scene);
 
 struct ModelSettings {

@@ -1,4 +1,5 @@
 #include <pipeline/level_meshes.h>
+#include <scene/emission.h>
 
 #include <limits>
 #include <map>
@@ -60,7 +61,8 @@ std::vector<Mesh> levelMeshes(const RayScene& rays, const Unwrap& unwrap, std::s
             mesh.page = page;
             if (from.door) mesh.door = sets + *from.door;
             mesh.reflectance = array(reflectances.of(t.material));
-            const glm::vec3 emission = emission_cd_m2.empty() ? material.emission_cd_m2 : emission_cd_m2[t.material];
+            const glm::vec3 emission = (emission_cd_m2.empty() ? material.emission_cd_m2 : emission_cd_m2[t.material]) *
+                                       meanEmissionShare(scene, {&t.mesh, 1}, t.material);
             mesh.emission_cd_m2 = array(emission);
             if (emission != glm::vec3(0)) mesh.emission_set = from.light_set;
         }

@@ -4,6 +4,7 @@
 #include <pack/mesh_codec.h>
 #include <pipeline/level_meshes.h>
 #include <probes/spherical_harmonics.h>
+#include <scene/emission.h>
 
 #include <meshoptimizer.h>
 
@@ -99,7 +100,8 @@ class ModelMeshes {
         mesh.min_m = toArray(low);
         mesh.max_m = toArray(high);
         mesh.reflectance = toArray(reflectances_.of(key.first));
-        const glm::vec3 emission = emission_cd_m2_.empty() ? material.emission_cd_m2 : emission_cd_m2_[key.first];
+        const glm::vec3 emission = (emission_cd_m2_.empty() ? material.emission_cd_m2 : emission_cd_m2_[key.first]) *
+                                   meanEmissionShare(scene_, model.meshes, key.first);
         mesh.emission_cd_m2 = toArray(emission);
         if (emission != glm::vec3(0)) mesh.emission_set = key.second;
         for (size_t i = 0; i < positions.size(); ++i)

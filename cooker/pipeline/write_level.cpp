@@ -242,12 +242,14 @@ class LevelWriter {
     void normaliseTextures() {
         if (!document_.json.contains("materials")) return;
         for (Json& material : document_.json["materials"]) {
-            const Json::json_pointer base("/pbrMetallicRoughness/baseColorTexture");
+            // As the importer has it: the emissive texture's where the base colour has none.
+            Json::json_pointer base("/pbrMetallicRoughness/baseColorTexture");
+            if (!material.contains(base)) base = Json::json_pointer("/emissiveTexture");
             size_t wanted = 0;
             if (material.contains(base)) wanted = normaliseBase(material, material[base]);
             for (const char* other : {"/pbrMetallicRoughness/metallicRoughnessTexture", "/normalTexture",
                                       "/occlusionTexture", "/emissiveTexture"})
-                if (const Json::json_pointer place(other); material.contains(place))
+                if (const Json::json_pointer place(other); place != base && material.contains(place))
                     if (!followsBase(material[place], wanted))
                         warnings_.push_back(
                             fmt::format("material '{}': {} wants TEXCOORD_{}, which is not written; TEXCOORD_0 is the "

@@ -40,11 +40,26 @@ class LevelImporter {
     Expected<void> prepare() {
         if (const auto ok = checkModel(context_); !ok) return ok;
         warnOfExtensions(context_);
-        auto mappings = importMaterials(context_);
+        auto placed = placeNodes(context_);
+        if (!placed) return std::unexpected(placed.error());
+        placed_ = std::move(*placed);
+        auto mappings = importMaterials(context_, usedMaterials());
         if (!mappings) return std::unexpected(mappings.error());
         meshes_.emplace(context_, std::move(*mappings));
         warnKeys();
         return {};
+    }
+
+    // By meshes of the scene's nodes: images of other materials may be missing.
+    std::vector<bool> usedMaterials() const {
+        std::vector<bool> used(model_.materials.size());
+        for (const PlacedNode& at : placed_) {
+            const int mesh = model_.nodes[static_cast<size_t>(at.node)].mesh;
+            if (mesh < 0) continue;
+            for (const tinygltf::Primitive& p : model_.meshes[static_cast<size_t>(mesh)].primitives)
+                if (p.material >= 0) used[static_cast<size_t>(p.material)] = true;
+        }
+        return used;
     }
 
     const tinygltf::Value& sceneExtras() const {
@@ -66,10 +81,8 @@ class LevelImporter {
     }
 
     Expected<void> nodes() {
-        const auto placed = placeNodes(context_);
-        if (!placed) return std::unexpected(placed.error());
         door_of_node_.resize(model_.nodes.size());
-        for (const PlacedNode& at : *placed)
+        for (const PlacedNode& at : placed_)
             if (const auto ok = node(at); !ok) return ok;
         return {};
     }
@@ -423,6 +436,7 @@ class LevelImporter {
     ImportContext context_{model_, scene_};
     Elements elements_{context_};
     LightProfiles profiles_{context_};
+    std::vector<PlacedNode> placed_;
     std::optional<MeshImporter> meshes_;
     struct DoorPart {
         std::optional<uint32_t> door;

@@ -9,11 +9,10 @@ namespace {
 
 class MaterialImporter {
    public:
-    explicit MaterialImporter(ImportContext& context) : context_(context) {}
+    MaterialImporter(ImportContext& context, std::vector<bool> used) : context_(context), used_(std::move(used)) {}
 
     Expected<std::vector<TextureMapping>> run() {
         const auto& materials = context_.model.materials;
-        findUsed();
         for (size_t i = 0; i < materials.size(); ++i)
             if (const auto ok = add(materials[i], static_cast<int>(i)); !ok) return std::unexpected(ok.error());
         return std::move(mappings_);
@@ -32,16 +31,6 @@ class MaterialImporter {
             if (const auto ok = (this->*step)(source, material); !ok) return ok;
         context_.scene.materials.push_back(std::move(material));
         return {};
-    }
-
-    // By nodes' meshes. Images of other materials may be missing, and take no memory.
-    void findUsed() {
-        used_.resize(context_.model.materials.size());
-        for (const tinygltf::Node& node : context_.model.nodes) {
-            if (node.mesh < 0) continue;
-            for (const tinygltf::Primitive& p : context_.model.meshes[static_cast<size_t>(node.mesh)].primitives)
-                if (p.material >= 0) used_[static_cast<size_t>(p.material)] = true;
-        }
     }
 
     // A factor that glTF limits to 0..1: beyond is clamped and said so, not a number is an error.
@@ -71,47 +60,59 @@ class MaterialImporter {
         return {};
     }
 
-    // The image behind a texture of a material that is used; empty when there is none (a texture may exist for an
-    // extension's image alone).
-    std::optional<int> imageOf(const tinygltf::TextureInfo& info) const {
+    // The image behind a texture of a material that is used; images of others may be missing, and take no memory.
+    // Empty, with a warning, when there is none that the bake can read: a texture may exist for an extension's image
+    // alone.
+    std::optional<int> imageOf(const tinygltf::TextureInfo& info, std::string_view what) {
         if (info.index < 0 || !is_used_) return std::nullopt;
         const int source = context_.model.textures[static_cast<size_t>(info.index)].source;
-        return source < 0 ? std::nullopt : std::optional(source);
+        if (source >= 0) return source;
+        context_.warn(owner_, fmt::format("its {} texture has no PNG or JPEG image and was ignored.", what));
+        return std::nullopt;
+    }
+
+    // Each image is decoded once; its index in `textures`.
+    using Images = std::map<int, size_t>;
+    Expected<uint32_t> textureOf(int image, std::vector<std::shared_ptr<const Texture>>& textures, Images& known) {
+        const auto [it, is_new] = known.try_emplace(image, textures.size());
+        if (is_new) {
+            Expected<Texture> decoded = decodeImage(context_, image, TransferFunction::Srgb, owner_);
+            if (!decoded) return std::unexpected(decoded.error());
+            textures.push_back(std::make_shared<const Texture>(std::move(*decoded)));
+        }
+        return static_cast<uint32_t>(it->second);
     }
 
     Expected<void> baseTexture(const tinygltf::Material& source, Material& material) {
+        constexpr std::string_view what = "base colour";
         const tinygltf::TextureInfo& info = source.pbrMetallicRoughness.baseColorTexture;
         mappings_.emplace_back();
-        if (info.index < 0 || !is_used_) return {};
-        const auto image = imageOf(info);
-        if (!image) {
-            context_.warn(owner_, "its base colour texture has no PNG or JPEG image and was ignored.");
-            return {};
-        }
-        const auto [known, is_new] = image_of_source_.try_emplace(*image, context_.scene.textures.size());
-        if (is_new) {
-            Expected<Texture> decoded = decodeImage(context_, *image, TransferFunction::Srgb, owner_);
-            if (!decoded) return std::unexpected(decoded.error());
-            context_.scene.textures.push_back(std::make_shared<const Texture>(std::move(*decoded)));
-        }
-        material.base_color_texture = static_cast<uint32_t>(known->second);
-        warnWrapping(info);
-        return mapping(info);
+        const auto image = imageOf(info, what);
+        if (!image) return {};
+        const auto texture = textureOf(*image, context_.scene.textures, base_images_);
+        if (!texture) return std::unexpected(texture.error());
+        material.base_color_texture = *texture;
+        warnWrapping(info, what);
+        const auto mapped = mapping(info);
+        if (!mapped) return std::unexpected(mapped.error());
+        mappings_.back() = *mapped;
+        return {};
     }
 
-    void warnWrapping(const tinygltf::TextureInfo& info) {
+    void warnWrapping(const tinygltf::TextureInfo& info, std::string_view what) {
         const int sampler = context_.model.textures[static_cast<size_t>(info.index)].sampler;
         if (sampler < 0) return;
         const tinygltf::Sampler& s = context_.model.samplers[static_cast<size_t>(sampler)];
         if (s.wrapS != TINYGLTF_TEXTURE_WRAP_REPEAT || s.wrapT != TINYGLTF_TEXTURE_WRAP_REPEAT)
-            context_.warn(owner_, "its base colour texture is clamped or mirrored; the bake repeats it instead.");
+            context_.warn(owner_,
+                          fmt::format("its {} texture is clamped or mirrored; the bake repeats it instead.", what));
     }
 
     // KHR_texture_transform: uv' = translation * rotation * scale * uv, rotated counter-clockwise as seen on the image
     // (v points down). That is its text and what Khronos' sample viewer does; the shader in its README turns the other
     // way.
-    Expected<void> mapping(const tinygltf::TextureInfo& info) {
-        TextureMapping& mapping = mappings_.back();
+    Expected<TextureMapping> mapping(const tinygltf::TextureInfo& info) const {
+        TextureMapping mapping;
         mapping.tex_coord = info.texCoord;
         const auto extension = info.extensions.find("KHR_texture_transform");
         if (extension != info.extensions.end() && extension->second.IsObject()) {
@@ -125,7 +126,7 @@ class MaterialImporter {
             if (values.Has("texCoord")) mapping.tex_coord = values.Get("texCoord").Get<int>();
         }
         if (!isFinite(mapping.u_axis) || !isFinite(mapping.v_axis)) return notFinite("KHR_texture_transform");
-        return {};
+        return mapping;
     }
 
     // Two numbers, as checkTypes() saw to.
@@ -143,8 +144,10 @@ class MaterialImporter {
     }
 
     Expected<void> metalTexture(const tinygltf::Material& source, Material& material) {
-        const auto image = imageOf(source.pbrMetallicRoughness.metallicRoughnessTexture);
-        if (!image || material.metallic == 0) return {};
+        const auto image = material.metallic == 0
+                               ? std::nullopt
+                               : imageOf(source.pbrMetallicRoughness.metallicRoughnessTexture, "metalness");
+        if (!image) return {};
         const auto texel = mean(*image, TransferFunction::Linear, "metalness");
         if (!texel) return std::unexpected(texel.error());
         material.metallic *= texel->b;  // the blue channel holds the metalness
@@ -176,11 +179,30 @@ class MaterialImporter {
         if (glm::any(glm::lessThan(emission, glm::dvec3(0))))
             return context_.error(owner_, "its emission is negative. Give it 0 or more.");
         material.emission_cd_m2 = emission;
-        const auto image = imageOf(source.emissiveTexture);
-        if (!image || !isEmissive(material)) return {};
-        const auto texel = mean(*image, TransferFunction::Srgb, "emissive");
-        if (!texel) return std::unexpected(texel.error());
-        material.emission_cd_m2 *= glm::vec3(*texel);
+        return isEmissive(material) ? emissiveTexture(source.emissiveTexture, material) : Expected<void>{};
+    }
+
+    // Coordinates are kept of one texture of each material.
+    Expected<void> emissiveTexture(const tinygltf::TextureInfo& info, Material& material) {
+        constexpr std::string_view what = "emissive";
+        const auto image = imageOf(info, what);
+        if (!image) return {};
+        const auto mapped = mapping(info);
+        if (!mapped) return std::unexpected(mapped.error());
+        if (material.base_color_texture && *mapped != mappings_.back()) {
+            const auto texel = mean(*image, TransferFunction::Srgb, what);
+            if (!texel) return std::unexpected(texel.error());
+            material.emission_cd_m2 *= glm::vec3(*texel);
+            return {};
+        }
+        mappings_.back() = *mapped;
+        warnWrapping(info, what);
+        const auto texture = textureOf(*image, context_.scene.emissive_textures, emissive_images_);
+        if (!texture) return std::unexpected(texture.error());
+        material.emissive_texture = *texture;
+        // Where no texel shines, nothing does.
+        if (context_.scene.emissive_textures[*texture]->mean() * glm::vec4(1, 1, 1, 0) == glm::vec4(0))
+            material.emission_cd_m2 = glm::vec3(0);
         return {};
     }
 
@@ -204,8 +226,8 @@ class MaterialImporter {
     std::string owner_;     // the material at hand
     bool is_used_ = false;  // likewise
     std::vector<TextureMapping> mappings_;
-    std::vector<bool> used_;                 // per material
-    std::map<int, size_t> image_of_source_;  // index into Scene::textures per image of the file
+    std::vector<bool> used_;  // per material
+    Images base_images_, emissive_images_;
 };
 
 }  // namespace
@@ -226,8 +248,8 @@ Material defaultMaterial() {
     return material;
 }
 
-Expected<std::vector<TextureMapping>> importMaterials(ImportContext& context) {
-    return MaterialImporter(context).run();
+Expected<std::vector<TextureMapping>> importMaterials(ImportContext& context, std::vector<bool> used) {
+    return MaterialImporter(context, std::move(used)).run();
 }
 
 }  // namespace dimmer::cook

@@ -175,7 +175,8 @@ Expected<SceneMesh> MeshImporter::import(int node, const std::vector<size_t>& pr
         if (primitive.material < 0)
             context_.warn(owner,
                           "has no material; glTF's default was used: white metal, reflectance 0.99. Give it one.");
-        if (context_.scene.materials[material].base_color_texture && read.uv0.empty() && !read.triangles.empty())
+        const Material& m = context_.scene.materials[material];
+        if ((m.base_color_texture || m.emissive_texture) && read.uv0.empty() && !read.triangles.empty())
             context_.warn(owner,
                           fmt::format("has no TEXCOORD_{} for its material's texture; the texture's corner was used.",
                                       mapping.tex_coord));

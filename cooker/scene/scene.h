@@ -47,6 +47,7 @@ struct Material {
     float alpha_cutoff = 0.5f;
     bool double_sided = false;
     std::optional<uint32_t> base_color_texture;  // index into Scene::textures, multiplies base_color and alpha
+    std::optional<uint32_t> emissive_texture;    // index into Scene::emissive_textures (scene/emission.h)
 
     // Total Lambert reflectance for a given base colour, clamped to [0, 0.99].
     glm::vec3 reflectance(glm::vec3 color) const;
@@ -174,8 +175,8 @@ struct ElementRef {
 struct Scene {
     std::string file;
     std::vector<Material> materials;
-    std::vector<std::shared_ptr<const Texture>> textures;  // shared by all copies of a scene
-    std::vector<SceneMesh> meshes;                         // dynamic ones included; they neither block nor reflect
+    std::vector<std::shared_ptr<const Texture>> textures, emissive_textures;  // shared by all copies of a scene
+    std::vector<SceneMesh> meshes;  // dynamic ones included; they neither block nor reflect
     std::vector<PunctualLight> lights;
     std::vector<SceneLightSet> light_sets;  // in order of first appearance
     std::vector<SceneDoor> doors;           // in order of first appearance

@@ -272,9 +272,10 @@ glm::vec4 RayScene::surfaceColor(uint32_t triangle, float u, float v) const {
     const SceneMesh& mesh = scene_.meshes[t.mesh];
     const Material& material = scene_.materials[t.material];
     glm::vec4 color(material.base_color, material.alpha);
-    if (material.base_color_texture && !mesh.uv0.empty()) {
+    if (material.base_color_texture) {
+        glm::vec2 uv(0);
         const glm::uvec3 index = mesh.triangles[t.triangle];
-        const glm::vec2 uv = (1 - u - v) * mesh.uv0[index.x] + u * mesh.uv0[index.y] + v * mesh.uv0[index.z];
+        if (!mesh.uv0.empty()) uv = (1 - u - v) * mesh.uv0[index.x] + u * mesh.uv0[index.y] + v * mesh.uv0[index.z];
         color *= scene_.textures[*material.base_color_texture]->sample(uv);
     }
     return color;

@@ -242,12 +242,24 @@ TEST(SceneModels, WhatFallsApartIntoSmallChartsGetsAGridUnlessTheLevelSaysOtherw
     for (size_t m = 1; m < scene.meshes.size(); ++m) EXPECT_EQ(scene.meshes[m].lighting, Lighting::Lightmap) << m;
 }
 
+// A cave that is all curves was refused, for want of a lightmap.
+TEST(SceneModels, ALevelOfCurvesAloneHasLightmaps) {
+    Scene scene;
+    addSphere(scene, 0.3f, 24, 12, addMaterial(scene, lambert(0.5f)));
+    addFloor(scene, 4, 0, -1).lighting = Lighting::None;
+    scene.meshes[0].uv1.clear();
+    scene.meshes[0].lighting = Lighting::Automatic;
+    chooseLighting(scene);
+    EXPECT_EQ(scene.meshes[0].lighting, Lighting::Lightmap);
+}
+
 // A grid over pebbles of two rooms, merged by a tool, lit the dark room's with 4 lux of the other's lamp.
 TEST(SceneModels, WhatLiesApartIsManyThings) {
     for (const float apart_m : {0.7f, 3.0f}) {
         Scene scene;
-        addSphere(scene, 0.3f, 24, 12, addMaterial(scene, lambert(0.5f)));
-        SceneMesh& mesh = scene.meshes[0];
+        addFloor(scene, 4, addMaterial(scene, lambert(0.5f)), -1).lighting = Lighting::Lightmap;
+        addSphere(scene, 0.3f, 24, 12, 0);
+        SceneMesh& mesh = scene.meshes[1];
         mesh.uv1.clear();
         mesh.lighting = Lighting::Automatic;
         const auto vertices = static_cast<uint32_t>(mesh.positions_m.size());

@@ -1,7 +1,10 @@
 #include <fmt/format.h>
+#include <scene/emission.h>
 #include <scene/expectations.h>
 #include <stb/stb_image_write.h>
+#include <trace/ray_scene.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
@@ -202,20 +205,111 @@ TEST(SceneMaterials, TextureTransformsOfTheWrongTypeAreRefused) {
                        {"material 'picture'", "'texCoord'", std::to_string(set)});
 }
 
-TEST(SceneMaterials, EmissiveAndMetalTexturesCountWithTheirMean) {
+TEST(SceneMaterials, MetalTexturesCountWithTheirMean) {
     LevelFile level = LevelFile::withFloor();
     const int texture = addTexture(level, {255, 0, 0, 255, 0, 0, 255, 255});
-    const int screen = level.addMaterial(
-        {{"name", "screen"}, {"emissiveFactor", {4, 4, 4}}, {"emissiveTexture", {{"index", texture}}}});
     const int half_metal = level.addMaterial(
         {{"name", "half"}, {"pbrMetallicRoughness", {{"metallicRoughnessTexture", {{"index", texture}}}}}});
-    for (const int material : {screen, half_metal}) level.addNode({{"mesh", level.addSquareMesh(material)}});
+    level.addNode({{"mesh", level.addSquareMesh(half_metal)}});
     const auto scene = level.import();
     ASSERT_IMPORTED(scene);
-    expectNear(scene->materials[1].emission_cd_m2, {2, 0, 2});
-    EXPECT_FLOAT_EQ(scene->materials[2].metallic, 0.5f);  // blue channel
-    expectWarning(*scene, {"material 'screen'", "emissive"});
+    EXPECT_FLOAT_EQ(scene->materials[1].metallic, 0.5f);  // blue channel
     expectWarning(*scene, {"material 'half'", "metalness"});
+}
+
+const std::vector<uint8_t> red_and_blue = {255, 0, 0, 255, 0, 0, 255, 255};
+
+// A screen that emits 4 cd/m2 times red on the left and blue on the right, with these coordinates at its corners.
+LevelFile levelWithScreen(const std::vector<glm::vec2>& uvs, const json& texture_info = json::object(),
+                          const std::vector<uint8_t>& rgba = red_and_blue) {
+    LevelFile level = LevelFile::withFloor();
+    json info = texture_info;
+    info["index"] = addTexture(level, rgba);
+    const int mesh = level.addSquareMesh(
+        level.addMaterial({{"name", "screen"}, {"emissiveFactor", {4, 4, 4}}, {"emissiveTexture", info}}));
+    level.primitive(mesh)["attributes"]["TEXCOORD_0"] = level.addVec2(uvs);
+    level.addNode({{"name", "screen"}, {"mesh", mesh}});
+    return level;
+}
+
+// It was the mean of the whole image, whatever of it a surface shows.
+TEST(SceneMaterials, SurfacesEmitWhatTheyShowOfAnEmissiveTexture) {
+    // One column: its texel's middle, or, where the image repeats, half of each.
+    const std::vector<std::pair<float, glm::vec3>> columns = {{0.25f, {4, 0, 0}}, {0.75f, {0, 0, 4}}, {1, {2, 0, 2}}};
+    for (const auto& [u, emission] : columns) {
+        const auto scene = levelWithScreen({{u, 0}, {u, 0}, {u, 1}, {u, 1}}).import();
+        ASSERT_IMPORTED(scene);
+        for (uint32_t t = 0; t < 2; ++t) expectNear(emissionOf(*scene, scene->meshes[1], t), emission);
+    }
+    // All of it: by area half red and half blue.
+    const auto whole = levelWithScreen({{0, 0}, {1, 0}, {1, 1}, {0, 1}}).import();
+    ASSERT_IMPORTED(whole);
+    const std::vector<uint32_t> screen = {1};
+    expectNear(meanEmissionShare(*whole, screen, 1), {0.5f, 0, 0.5f}, 0.01f);  // eight parts to a side of two texels
+    // The transform moves what is shown.
+    const json moved = {{"extensions", {{"KHR_texture_transform", {{"offset", {0.5, 0}}}}}}};
+    const auto blue = levelWithScreen({{0.25f, 0}, {0.25f, 0}, {0.25f, 1}, {0.25f, 1}}, moved).import();
+    ASSERT_IMPORTED(blue);
+    expectNear(emissionOf(*blue, blue->meshes[1], 0), {0, 0, 4});
+    EXPECT_TRUE(blue->warnings.empty());
+}
+
+// One set of coordinates is kept.
+TEST(SceneMaterials, EmissiveTexturesMappedUnlikeTheBaseColourCountWithTheirMean) {
+    LevelFile level = levelWithScreen({{0.25f, 0}, {0.25f, 0}, {0.25f, 1}, {0.25f, 1}});
+    json& material = level.document["materials"].back();
+    material["pbrMetallicRoughness"]["baseColorTexture"] = material["emissiveTexture"];
+    const auto alike = level.import();
+    ASSERT_IMPORTED(alike);
+    expectNear(emissionOf(*alike, alike->meshes[1], 0), {4, 0, 0});
+    EXPECT_TRUE(alike->warnings.empty());
+    material["emissiveTexture"]["extensions"] = {{"KHR_texture_transform", {{"offset", {0.5, 0}}}}};
+    const auto apart = level.import();
+    ASSERT_IMPORTED(apart);
+    expectNear(emissionOf(*apart, apart->meshes[1], 0), {2, 0, 2});
+    expectWarning(*apart, {"material 'screen'", "mean of its emissive"});
+}
+
+TEST(SceneMaterials, NothingShinesBehindABlackEmissiveTexture) {
+    const auto scene =
+        levelWithScreen({{0, 0}, {1, 0}, {1, 1}, {0, 1}}, json::object(), {0, 0, 0, 255, 0, 0, 0, 255}).import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->materials[1].emission_cd_m2, glm::vec3(0));
+}
+
+// Textures whose only image is an extension's: the factors stood for them, and nobody said so.
+TEST(SceneMaterials, TexturesWithoutAReadableImageAreTold) {
+    LevelFile level = levelWithScreen({{0, 0}, {1, 0}, {1, 1}, {0, 1}});
+    json& material = level.document["materials"].back();
+    for (const char* place : {"baseColorTexture", "metallicRoughnessTexture"})
+        material["pbrMetallicRoughness"][place] = material["emissiveTexture"];
+    level.document["textures"].back() = {{"extensions", {{"EXT_texture_webp", {{"source", 0}}}}}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    for (const char* what : {"base colour", "metalness", "emissive"})
+        expectWarning(*scene, {"material 'screen'", what, "no PNG or JPEG image"});
+}
+
+// The other scene's picture is missing.
+TEST(SceneMaterials, ImagesOfOtherScenesAreNotWanted) {
+    LevelFile level = levelWithPoster(json::object(), red_and_grey);
+    level.document["images"][0] = {{"name", "picture"}, {"uri", "nowhere.png"}};
+    const auto poster = level.document["nodes"].size() - 1;
+    json& roots = level.document["scenes"][0]["nodes"];
+    roots.erase(std::find(roots.begin(), roots.end(), json(poster)));
+    level.document["scenes"].push_back({{"nodes", {poster}}});
+    ASSERT_IMPORTED(level.import());
+}
+
+TEST(SceneMaterials, WithoutCoordinatesTheTexturesCornerCounts) {
+    LevelFile level = levelWithPoster(json::object(), {0, 0, 0, 255, 0, 0, 0, 255});
+    level.primitive(static_cast<int>(level.document["meshes"].size()) - 1)["attributes"].erase("TEXCOORD_0");
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    expectWarning(*scene, {"node 'poster'", "the texture's corner was used"});
+    const RayScene rays(*scene);
+    for (uint32_t t = 0; t < rays.triangles().size(); ++t)
+        EXPECT_EQ(glm::vec3(rays.surfaceColor(t, 0.2f, 0.2f)) == glm::vec3(0), rays.triangles()[t].mesh == 1) << t;
 }
 
 // Programs write image/jpg and others beside the two types that glTF names: the bytes say what it is.
