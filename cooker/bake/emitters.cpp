@@ -34,6 +34,15 @@ glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
 }
 
+// The largest cosine at the emitter, about, of a way to a place within so much of the centre: of a lamp that is a ball
+// half of the surface looks elsewhere.
+float facing(const Emitter& e, glm::vec3 to_centre, float radius_m) {
+    const float distance_m = glm::length(to_centre);
+    if (distance_m <= radius_m) return 1;
+    const float cosine = glm::dot(to_centre, e.normal) / distance_m;
+    return std::clamp((e.double_sided ? std::abs(cosine) : cosine) + radius_m / distance_m, 0.0f, 1.0f);
+}
+
 using Choice = EmitterSampler::Choice;
 
 // Takes those of the least weight out that have `left_max` together at most. Keeps the order.
@@ -176,9 +185,9 @@ void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>
             const glm::vec3 to_centre = centre - (e.corner + (e.edge1 + e.edge2) / 3.0f);
             brightest = std::max(brightest, luminance(e.radiance_cd_m2));
             if (!e.double_sided && glm::dot(centre - e.corner, e.normal) < -radius_m) continue;
-            const float near2 = radius_m * radius_m + e.area_m2;
+            const float distance2 = glm::dot(to_centre, to_centre), near2 = radius_m * radius_m + e.area_m2;
             const float weight =
-                luminance(e.radiance_cd_m2) * e.area_m2 / std::max(glm::dot(to_centre, to_centre), near2);
+                luminance(e.radiance_cd_m2) * e.area_m2 * facing(e, to_centre, radius_m) / std::max(distance2, near2);
             choices.push_back({static_cast<uint32_t>(i), weight});
             sum += weight;
         }
