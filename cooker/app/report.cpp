@@ -34,14 +34,14 @@ Expected<void> checkPackOf(const nlohmann::json& json, const std::string& file, 
     const auto id = json.is_object() ? json.find("pack_id") : json.end();
     if (id == json.end() || *id == packId(pack)) return {};
     return fail(ErrorCode::BadInput,
-                fmt::format("{}: it is of another pack than {}; run `dimmer {} --json` anew", file, pack, command));
+                fmt::format("{}: it is of another pack than {}; run `dimmer {}` anew", file, pack, command));
 }
 
 // What `cook --json` wrote.
 Expected<void> addCook(const std::string& file, const std::string& pack, ReportInput& input) {
     const auto json = readJson(file);
     if (!json) return std::unexpected(json.error());
-    if (auto ok = checkPackOf(*json, file, "cook", pack); !ok) return ok;
+    if (auto ok = checkPackOf(*json, file, "cook --json", pack); !ok) return ok;
     try {
         input.seconds = json->at("seconds").get<std::map<std::string, double>>();
         if (const auto of_bake = json->find("bake_seconds"); of_bake != json->end())
@@ -75,9 +75,20 @@ Expected<void> addVerify(const std::string& file, const std::string& pack, Repor
     if (!json) return std::unexpected(json.error());
     if (!isVerifyReport(*json))
         return fail(ErrorCode::BadInput, fmt::format("{}: it is not what `dimmer verify --json` writes", file));
-    if (auto ok = checkPackOf(*json, file, "verify", pack); !ok) return ok;
+    if (auto ok = checkPackOf(*json, file, "verify --json", pack); !ok) return ok;
     input.verify = std::move(*json);
     return {};
+}
+
+// Pictures of another pack may have pages of the same size. Those of a version that did not say are taken on trust.
+Expected<void> addHeatMaps(const std::string& folder, const std::string& pack, ReportInput& input) {
+    input.heat_maps = folder;
+    const auto index = input.heat_maps / heat_map_index;
+    std::error_code ignored;
+    if (folder.empty() || !std::filesystem::exists(index, ignored)) return {};
+    const auto json = readJson(index.string());
+    if (!json) return std::unexpected(json.error());
+    return checkPackOf(*json, index.string(), "verify --heatmap", pack);
 }
 
 int run(const ReportArguments& a) {
@@ -94,7 +105,7 @@ int run(const ReportArguments& a) {
         if (auto ok = addCook(a.cook_json, a.pack, input); !ok) return reportError(ok.error());
     if (!a.verify_json.empty())
         if (auto ok = addVerify(a.verify_json, a.pack, input); !ok) return reportError(ok.error());
-    input.heat_maps = a.heat_maps;
+    if (auto ok = addHeatMaps(a.heat_maps, a.pack, input); !ok) return reportError(ok.error());
     if (auto ok = writeReport(*pack, input, a.output); !ok) return reportError(ok.error());
     return exit_done;
 }

@@ -183,7 +183,8 @@ int run(VerifyArguments a) {
     const auto report = verify(*scene, *pack, a.options, progress);
     if (!report) return reportError(report.error());
     if (!a.heatmap.empty())
-        if (auto ok = writeHeatMaps(a.heatmap, *pack, *report, a.options.state); !ok) return reportError(ok.error());
+        if (auto ok = writeHeatMaps(a.heatmap, *pack, packId(a.pack), *report, a.options.state); !ok)
+            return reportError(ok.error());
     if (!a.csv.empty())
         if (auto ok = writeCsv(*report, a.csv); !ok) return reportError(ok.error());
     if (!a.json.empty())

@@ -10,7 +10,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <nlohmann/json.hpp>
+#include <span>
 #include <system_error>
+#include <vector>
 
 namespace dimmer::cook {
 namespace {
@@ -40,6 +43,21 @@ struct Picture {
     }
 };
 
+// Made when missing, and rid of an earlier run's pictures, the index first.
+Expected<void> emptyFolder(const std::filesystem::path& folder) {
+    std::error_code error;
+    std::filesystem::create_directories(folder, error);
+    if (!error) std::filesystem::remove(folder / heat_map_index, error);
+    std::vector<std::filesystem::path> old;
+    for (std::filesystem::directory_iterator entry(folder, error); !error && entry != end(entry);
+         entry.increment(error))
+        if (isHeatMapName(entry->path().filename().native())) old.push_back(entry->path());
+    for (const auto& file : old)
+        if (!error) std::filesystem::remove(file, error);
+    if (error) return fail(ErrorCode::Io, fmt::format("{}: {}", folder.string(), error.message()));
+    return {};
+}
+
 }  // namespace
 
 std::string heatMapName(uint32_t page) {
@@ -49,14 +67,12 @@ std::string heatMapName(uint32_t page) {
 bool isHeatMapName(std::string_view name) {
     const std::string text(name);
     uint32_t page = 0;
-    return std::sscanf(text.c_str(), "page_%u", &page) == 1 && text == heatMapName(page);
+    return name == heat_map_index || (std::sscanf(text.c_str(), "page_%u", &page) == 1 && text == heatMapName(page));
 }
 
-Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pack, const VerifyReport& report,
-                             std::string_view state) {
-    std::error_code error;
-    std::filesystem::create_directories(folder, error);
-    if (error) return fail(ErrorCode::Io, fmt::format("{}: {}", folder.string(), error.message()));
+Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pack, const std::string& pack_id,
+                             const VerifyReport& report, std::string_view state) {
+    if (auto ok = emptyFolder(folder); !ok) return ok;
     CpuRuntime runtime(pack);
     if (auto ok = runtime.apply(state); !ok) return ok;
     runtime.update();
@@ -81,7 +97,9 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
         if (!png) return std::unexpected(png.error());
         if (auto ok = writeFileAtomically(file, *png); !ok) return ok;
     }
-    return {};
+    const nlohmann::ordered_json index = {{"pack_id", pack_id}, {"state", state}, {"pages", pack.pageCount()}};
+    const std::string text = index.dump(2) + "\n";
+    return writeFileAtomically(folder / heat_map_index, std::as_bytes(std::span(text)));
 }
 
 }  // namespace dimmer::cook

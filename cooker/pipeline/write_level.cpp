@@ -144,11 +144,21 @@ class LevelWriter {
             for (const auto& attribute : primitive["attributes"].items())
                 if (!isWritten(attribute.key())) lost.insert(attribute.key());
             if (primitive.contains("targets")) lost.insert("its morph targets");
+            if (primitive.contains("extras")) lost.insert("extras of its primitives");
+            addExtensions(primitive, lost);
         }
+        addExtensions(original_mesh_[node], lost);
         if (!lost.empty())
             warn(fmt::format("{} {} not written", fmt::join(lost, ", "), lost.size() > 1 ? "are" : "is"));
         n.erase("skin");
         n.erase("weights");
+    }
+
+    // But for what said only how the file held it.
+    static void addExtensions(const Json& of, std::set<std::string>& lost) {
+        if (!of.contains("extensions")) return;
+        for (const auto& extension : of["extensions"].items())
+            if (extension.key() != "KHR_draco_mesh_compression") lost.insert(extension.key());
     }
 
     // Channels that move morph targets which are no longer there.

@@ -225,6 +225,17 @@ class Report {
         body_ += fmt::format("</div>\n<p class=dim>{} texels never change.</p>\n", histogram[0]);
     }
 
+    static bool isOfNothing(const nlohmann::json& figures) {
+        return figures.is_object() && figures.contains("points") && figures["points"] == 0;
+    }
+
+    // Of what `verify` measured.
+    static std::string stateOf(const nlohmann::json& verified) {
+        const std::string state =
+            verified.contains("state") && verified["state"].is_string() ? verified["state"] : nlohmann::json("");
+        return state.empty() ? "All light sets on, doors closed" : "In the state " + escaped(state);
+    }
+
     // Figures of `verify --json` and pictures of `verify --heatmap`.
     Expected<void> errors() {
         const auto number = [](const nlohmann::json& object, const char* key) {
@@ -233,11 +244,13 @@ class Report {
         };
         const nlohmann::json& v = input_.verify;
         if (v.is_object()) {
-            body_ +=
-                "<h2>Error against the path tracer</h2>\n<div class=scroll><table><tr><th>points<th>mean<th>95 "
-                "%<th>bias\n";
-            for (const char* where : {"surface", "tilted"})
-                if (v.contains(where))
+            body_ += fmt::format("<h2>Error against the path tracer</h2>\n<p class=dim>{}{}</p>\n", stateOf(v),
+                                 v.contains("converged") && v["converged"] == false
+                                     ? "; not converged: what noise adds is taken off"
+                                     : "");
+            body_ += "<div class=scroll><table><tr><th>points<th>mean<th>95 %<th>bias\n";
+            for (const char* where : {"surface", "tilted", "grid", "models", "models_without_self_visibility"})
+                if (v.contains(where) && !isOfNothing(v[where]))
                     body_ += fmt::format("<tr><td>{}<td>{}<td>{}<td>{}\n", where, number(v[where], "mean"),
                                          number(v[where], "p95"), number(v[where], "bias"));
             body_ += "</table></div>\n";
@@ -253,7 +266,7 @@ class Report {
                     body_ += "<tr>";
                     for (const char* name : names) body_ += "<td>" + escaped(row[name].get<std::string>());
                     // Nothing of the reference's counts: then there is no share of it.
-                    const bool none = row.contains("points") && row["points"] == 0;
+                    const bool none = isOfNothing(row);
                     for (const char* share : {"error", "bias", "reference_noise"})
                         body_ += "<td>" + (none ? "-" : number(row, share));
                     body_ += fmt::format("<td>{}\n", number(row, "elsewhere"));

@@ -150,8 +150,8 @@ Expected<void> checkElementName(const ImportContext& context, const std::string&
                           std::ranges::none_of(name, [](unsigned char c) { return c < 0x20; });
     if (!writable)
         return context.error(owner,
-                             fmt::format("'{}' is '{}', but a name needs a character, and none of ',', '=' and line "
-                                         "breaks, nor blanks at its ends. Rename it.",
+                             fmt::format("'{}' is '{}', but a name needs a character, and none of ',', '=', tabs and "
+                                         "line breaks, nor blanks at its ends. Rename it.",
                                          key, name));
     if (key == "dimmer_light_set" && (name == "all" || name == "always" || name.starts_with("door:")))
         return context.error(owner, fmt::format("the light set's name '{}' has a meaning of its own where states "

@@ -70,6 +70,8 @@ struct NearestSurface::Impl {
         return glm::normalize(glm::cross(position(t, 1) - position(t, 0), position(t, 2) - position(t, 0)));
     }
 
+    bool isLeaf(const Triangle& t) const { return meshes[t.mesh].door.has_value(); }
+
     static bool visit(RTCPointQueryFunctionArguments* arguments) {
         auto& q = *static_cast<Query*>(arguments->userPtr);
         const Triangle& t = q.self->triangles[arguments->primID];
@@ -80,9 +82,13 @@ struct NearestSurface::Impl {
         const float distance = glm::distance(q.point, w.x * a + w.y * b + w.z * c);
         if (!(distance <= arguments->query->radius)) return false;
         constexpr float same_m = 1e-4f;  // coordinates in a file are rounded: nearer than this is equally near
+        const auto isBetterOfTwoAlike = [&] {
+            const bool leaf = q.self->isLeaf(t), other_leaf = q.self->isLeaf(q.self->triangles[q.best]);
+            return leaf != other_leaf ? other_leaf : distance < q.distance_m;
+        };
         const bool better = q.best == UINT32_MAX || distance < q.distance_m - same_m ||
                             (distance < q.distance_m + same_m &&
-                             (facing > q.facing + 1e-4f || (facing > q.facing - 1e-4f && distance < q.distance_m)));
+                             (facing > q.facing + 1e-4f || (facing > q.facing - 1e-4f && isBetterOfTwoAlike())));
         if (!better) return false;
         q.best = arguments->primID;
         q.weights = w;

@@ -25,7 +25,7 @@ class NearestSurface {
     ~NearestSurface();
 
     // The nearest point within `radius_m` on a surface that faces as `normal` does (within 90 degrees); of equally near
-    // ones that which faces it best.
+    // ones that which faces it best, and of those that is no door's leaf: it may be open.
     std::optional<SurfacePlace> find(glm::vec3 point, glm::vec3 normal, float radius_m) const;
 
    private:

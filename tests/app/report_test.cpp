@@ -17,9 +17,10 @@ TEST_F(ReportTool, OfAPackWithWhatCookAndVerifySaid) {
     const auto result = runDimmer({"report", pack(), "-o", file("report.html"), "--cook", file("cook.json"), "--verify",
                                    file("error.json"), "--heatmap", file("heat")});
     ASSERT_EQ(result.exit_code, 0) << result.err;
-    EXPECT_THAT(readText(file("report.html")),
-                AllOf(HasSubstr("level.dimmer"), HasSubstr("region of both"), HasSubstr("encode"),
-                      HasSubstr("Error against"), HasSubstr("error on page 0")));
+    EXPECT_THAT(
+        readText(file("report.html")),
+        AllOf(HasSubstr("level.dimmer"), HasSubstr("region of both"), HasSubstr("encode"), HasSubstr("Error against"),
+              HasSubstr("error on page 0"), HasSubstr("All light sets on, doors closed")));
 }
 
 TEST_F(ReportTool, OfACook) {
@@ -80,6 +81,12 @@ TEST_F(ReportTool, WhatIsRefused) {
     const auto second = cook("second.dimmer", {"--set", "records.threshold=0.2", "--json", file("second.json")});
     ASSERT_EQ(second.exit_code, 0) << second.err;
     refused({"--cook", file("second.json")}, "of another pack");
+    // Pages of the same size, too.
+    ASSERT_EQ(runDimmer({"verify", file("level.gltf"), file("second.dimmer"), "--points", "50", "--paths", "64",
+                         "--no-sets", "--heatmap", file("second_heat")})
+                  .exit_code,
+              0);
+    refused({"--heatmap", file("second_heat")}, "heat_maps.json: it is of another pack");
 }
 
 }  // namespace

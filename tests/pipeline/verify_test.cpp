@@ -6,7 +6,9 @@
 #include <pipeline/verify.h>
 #include <scene/level_file.h>
 
+#include <fstream>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 
 namespace dimmer::cook::test {
@@ -247,10 +249,18 @@ TEST(HeatMap, WritesOnePicturePerPage) {
     const auto report = verify(scene, *pack, options, progress);
     ASSERT_TRUE(report);
     const TemporaryFolder folder;
-    ASSERT_TRUE(writeHeatMaps(folder.path / "new", *pack, *report, ""));
+    const auto heat = folder.path / "new";
+    std::filesystem::create_directory(heat);
+    for (const char* name : {"page_7.png", "page_1.jpg"}) std::ofstream(heat / name) << "of an earlier run";
+    ASSERT_TRUE(writeHeatMaps(heat, *pack, "1234", *report, "all=1"));
+    EXPECT_FALSE(std::filesystem::exists(heat / "page_7.png"));
+    EXPECT_TRUE(std::filesystem::exists(heat / "page_1.jpg"));  // nobody's
+    std::ifstream index(heat / "heat_maps.json");
+    const nlohmann::json wanted = {{"pack_id", "1234"}, {"state", "all=1"}, {"pages", pack->pageCount()}};
+    EXPECT_EQ(nlohmann::json::parse(index, nullptr, false), wanted);
     for (uint32_t page = 0; page < pack->pageCount(); ++page)
         EXPECT_GT(std::filesystem::file_size(folder.path / "new" / ("page_" + std::to_string(page) + ".png")), 100u);
-    EXPECT_EQ(writeHeatMaps("/proc/no/such/place", *pack, *report, "").error().code, ErrorCode::Io);
+    EXPECT_EQ(writeHeatMaps("/proc/no/such/place", *pack, "", *report, "").error().code, ErrorCode::Io);
 }
 
 }  // namespace

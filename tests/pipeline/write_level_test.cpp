@@ -178,6 +178,13 @@ TEST(WriteLevel, SaysWhatIsLost) {
     const Written written(level);
     EXPECT_THAT(written.warnings, testing::Contains(testing::AllOf(testing::HasSubstr("floor"),
                                                                    testing::HasSubstr("COLOR_0 is not written"))));
+    LevelFile more = level;
+    more.primitive(mesh)["extras"] = {{"sound", "wood"}};
+    more.primitive(mesh)["extensions"] = {{"KHR_materials_variants", {{"mappings", json::array()}}}};
+    more.document["meshes"][static_cast<size_t>(mesh)]["extensions"] = {{"EXT_of_a_mesh", json::object()}};
+    EXPECT_THAT(Written(more).warnings,
+                testing::Contains(testing::HasSubstr(
+                    "COLOR_0, EXT_of_a_mesh, KHR_materials_variants, extras of its primitives are not written")));
     EXPECT_THAT(written.warnings, testing::Contains(testing::HasSubstr("occlusionTexture wants TEXCOORD_1")));
     EXPECT_THAT(written.warnings, testing::Contains(testing::HasSubstr("metallicRoughnessTexture wants TEXCOORD_3")));
     const Glb glb(written.path);

@@ -137,6 +137,23 @@ TEST(Report, ListsTheSettingsThatAreSome) {
                             Not(HasSubstr("hostile")), Not(HasSubstr("<td>other"))));
 }
 
+// What the figures hold for, and all of them: a state with everything off read as any other.
+TEST(Report, SaysWhatVerifyMeasured) {
+    const Pack pack = packOf(dimmer::test::samplePack());
+    ReportInput input;
+    input.verify = nlohmann::json::parse(
+        R"({"state": "all=0,a<b=1", "converged": false, "surface": {"mean": 0.01, "p95": 0.02, "bias": 0, "points": 9},
+            "grid": {"mean": 0.1692, "p95": 0.59, "bias": null, "points": 40}, "models": {"mean": 0, "points": 0}})");
+    EXPECT_THAT(htmlOf(pack, input),
+                AllOf(HasSubstr("In the state all=0,a&lt;b=1"), HasSubstr("not converged"),
+                      HasSubstr("<td>grid<td>16.92 %<td>59.00 %<td>-"), Not(HasSubstr("<td>models"))));
+    input.verify["converged"] = true;
+    input.verify["state"] = "";
+    EXPECT_THAT(htmlOf(pack, input), AllOf(HasSubstr("All light sets on"), Not(HasSubstr("not converged"))));
+    input.verify["state"] = input.verify["grid"] = 7;  // of somebody else
+    EXPECT_THAT(htmlOf(pack, input), HasSubstr("<td>grid<td>-"));
+}
+
 TEST(Report, VerifyAndItsHeatMaps) {
     const Pack pack = packOf(dimmer::test::samplePack());
     const test::TemporaryFolder folder;
