@@ -18,8 +18,10 @@ constexpr float left_share_max = 1e-3f;
 // So is a group where it has less than this share of its mean light in the cells that it shines into, and fills less
 // than that share of the hemisphere.
 constexpr float cell_share_min = 1e-3f, coverage_min = 1e-5f;
-// Choices take 12 bytes for each cell: of more, all cells share those by power. So many more are not even sorted.
-constexpr size_t choices_max = 1024, sorted_max = 8 * choices_max;
+// Choices take 8 bytes for each cell: a group of more emitters has patches of them.
+constexpr uint32_t single_max = 1024, patches_max = 128;
+// Halves of a patch lie apart along its longest side, or their normals do: these are so long, of its diagonal.
+constexpr float normal_length = 0.6f;
 // Every emitter sends out some of its group's rays, up to so many in all.
 constexpr uint32_t rays_per_emitter = 128, probe_rays_max = 65536;
 constexpr float lift_m = 1e-3f;  // off the emitter
@@ -32,15 +34,6 @@ glm::vec2 onTriangle(glm::vec2 u) {
 }
 glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
-}
-
-// The largest cosine at the emitter, about, of a way to a place within so much of the centre: of a lamp that is a ball
-// half of the surface looks elsewhere.
-float facing(const Emitter& e, glm::vec3 to_centre, float radius_m) {
-    const float distance_m = glm::length(to_centre);
-    if (distance_m <= radius_m) return 1;
-    const float cosine = glm::dot(to_centre, e.normal) / distance_m;
-    return std::clamp((e.double_sided ? std::abs(cosine) : cosine) + radius_m / distance_m, 0.0f, 1.0f);
 }
 
 using Choice = EmitterSampler::Choice;
@@ -70,6 +63,30 @@ float probability(std::span<const Choice> choices, size_t i) {
     return choices[i].cumulative - (i == 0 ? 0 : choices[i - 1].cumulative);
 }
 
+struct Bounds {
+    glm::vec3 low{INFINITY}, high{-INFINITY};
+    void add(glm::vec3 p) { low = glm::min(low, p), high = glm::max(high, p); }
+    glm::vec3 size() const { return high - low; }
+};
+
+glm::vec3 middleOf(const Emitter& e) {
+    return e.corner + (e.edge1 + e.edge2) / 3.0f;
+}
+
+// Orders the emitters so that both halves lie together or face alike.
+void splitInHalves(std::span<Emitter> emitters) {
+    Bounds places, normals;
+    for (const Emitter& e : emitters) {
+        places.add(middleOf(e));
+        normals.add(e.normal);
+    }
+    const auto longest = [](glm::vec3 v) { return v.x >= v.y && v.x >= v.z ? 0 : v.y >= v.z ? 1 : 2; };
+    const int along = longest(places.size()), among = longest(normals.size());
+    const bool by_normal = normal_length * glm::length(places.size()) * normals.size()[among] > places.size()[along];
+    std::ranges::stable_sort(emitters, {},
+                             [&](const Emitter& e) { return by_normal ? e.normal[among] : middleOf(e)[along]; });
+}
+
 }  // namespace
 
 std::vector<uint32_t> meshGroups(const Scene& scene) {
@@ -97,8 +114,9 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
         emitters_.push_back(e);
     }
     std::ranges::stable_sort(emitters_, {}, &Emitter::group);
-    for (uint32_t i = 0; i < emitters_.size(); ++i) emitter_of_[emitters_[i].triangle] = i;
     if (emitters_.empty()) return;
+    makePatches();
+    for (uint32_t i = 0; i < emitters_.size(); ++i) emitter_of_[emitters_[i].triangle] = i;
     for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
 
     grid_ = {rays.boundsMin(), rays.boundsMax(), emitter_cell_min_m};
@@ -125,24 +143,73 @@ void EmitterSampler::leaveFaintGroups() {
             groups[c.group].light += static_cast<double>(c.light);
             ++groups[c.group].cells;
         }
-    by_power_.resize(groups.size());
     for (Cell& cell : cells_) {
         std::erase_if(cell, [&](const CellGroup& c) {
             const double mean = groups[c.group].light / groups[c.group].cells;
             return !c.wide && static_cast<double>(c.light) < static_cast<double>(cell_share_min) * mean;
         });
-        for (const CellGroup& c : cell)
-            if (c.choices.empty() && by_power_[c.group].empty()) by_power_[c.group] = choicesByPower(c.group);
     }
 }
 
-std::vector<EmitterSampler::Choice> EmitterSampler::choicesByPower(uint32_t group) const {
-    std::vector<Choice> choices;
-    for (uint32_t i = 0; i < emitters_.size(); ++i)
-        if (emitters_[i].group == group)
-            choices.push_back({i, luminance(emitters_[i].radiance_cd_m2) * emitters_[i].area_m2});
-    makeCumulative(choices);
-    return choices;
+void EmitterSampler::makePatches() {
+    for (uint32_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
+        while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
+        const uint32_t parts = end - begin <= single_max ? end - begin : patches_max;
+        std::vector<uint32_t> ends = {begin, end};
+        // Halves of halves; `parts` is a power of two where there are fewer than emitters.
+        for (uint32_t count = 1; parts == patches_max && parts < end - begin && count < parts; count *= 2) {
+            std::vector<uint32_t> halves = {begin};
+            for (uint32_t i = 0; i < count; ++i) {
+                splitInHalves(std::span(emitters_).subspan(ends[i], ends[i + 1] - ends[i]));
+                halves.push_back(ends[i] + (ends[i + 1] - ends[i]) / 2);
+                halves.push_back(ends[i + 1]);
+            }
+            ends = std::move(halves);
+        }
+        if (parts == end - begin)
+            for (uint32_t i = begin; i < end; ++i) addPatch(i, i + 1);
+        else
+            for (size_t i = 0; i + 1 < ends.size(); ++i) addPatch(ends[i], ends[i + 1]);
+    }
+}
+
+void EmitterSampler::addPatch(uint32_t begin, uint32_t end) {
+    Patch p{.begin = begin, .end = end};
+    const auto powerOf = [](const Emitter& e) { return luminance(e.radiance_cd_m2) * e.area_m2; };
+    const auto own = std::span<const Emitter>(emitters_).subspan(begin, end - begin);
+    std::vector<Choice> chances;
+    for (const Emitter& e : own) {
+        chances.push_back({0, powerOf(e)});
+        p.power += powerOf(e);
+        p.area_m2 += e.area_m2;
+        p.brightest = std::max(p.brightest, luminance(e.radiance_cd_m2));
+        p.double_sided = p.double_sided || e.double_sided;
+        p.centre += middleOf(e) / static_cast<float>(own.size());
+        p.normal += e.normal;
+    }
+    makeCumulative(chances);
+    const float length = glm::length(p.normal);
+    p.normal = length > 0 ? p.normal / length : own[0].normal;
+    for (size_t i = 0; i < own.size(); ++i) {
+        p.radius_m = std::max(p.radius_m, glm::distance(p.centre, middleOf(own[i])));
+        p.normal_spread =
+            std::max(p.normal_spread, std::acos(std::clamp(glm::dot(p.normal, own[i].normal), -1.0f, 1.0f)));
+        within_.push_back(chances[i].cumulative);
+        patch_of_emitter_.push_back(static_cast<uint32_t>(patches_.size()));
+    }
+    patches_.push_back(p);
+}
+
+// The largest cosine at a patch, about, of a way to a place within so much of the centre: of a lamp that is a ball half
+// of the surface looks elsewhere.
+float EmitterSampler::facing(const Patch& patch, glm::vec3 to_centre, float radius_m) {
+    const float distance_m = glm::length(to_centre), reach_m = radius_m + patch.radius_m;
+    if (distance_m <= reach_m) return 1;
+    float cosine = glm::dot(to_centre, patch.normal) / distance_m;
+    if (patch.double_sided) cosine = std::abs(cosine);
+    if (patch.normal_spread > 0)
+        cosine = std::cos(std::max(0.0f, std::acos(std::clamp(cosine, -1.0f, 1.0f)) - patch.normal_spread));
+    return std::clamp(cosine + reach_m / distance_m, 0.0f, 1.0f);
 }
 
 std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<const Emitter> of_group) const {
@@ -173,30 +240,28 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
 void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>> lit) {
     const glm::vec3 centre = grid_.centre(index);
     const float radius_m = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
-    for (size_t begin = 0, g = 0; begin < emitters_.size(); ++g) {
-        size_t end = begin;
-        while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
-        const size_t range_begin = std::exchange(begin, end);
+    const auto groupAt = [&](size_t patch) { return emitters_[patches_[patch].begin].group; };
+    for (size_t begin = 0, end = 0, g = 0; begin < patches_.size(); begin = end, ++g) {
+        while (end < patches_.size() && groupAt(end) == groupAt(begin)) ++end;
         if (!lit[g][index]) continue;
         std::vector<Choice> choices;
         float sum = 0, brightest = 0;
-        for (size_t i = range_begin; i < end; ++i) {
-            const Emitter& e = emitters_[i];
-            const glm::vec3 to_centre = centre - (e.corner + (e.edge1 + e.edge2) / 3.0f);
-            brightest = std::max(brightest, luminance(e.radiance_cd_m2));
-            if (!e.double_sided && glm::dot(centre - e.corner, e.normal) < -radius_m) continue;
-            const float distance2 = glm::dot(to_centre, to_centre), near2 = radius_m * radius_m + e.area_m2;
+        for (size_t i = begin; i < end; ++i) {
+            const Patch& p = patches_[i];
+            brightest = std::max(brightest, p.brightest);
+            const glm::vec3 to_centre = centre - p.centre;
+            const float near2 = radius_m * radius_m + p.area_m2;
             const float weight =
-                luminance(e.radiance_cd_m2) * e.area_m2 * facing(e, to_centre, radius_m) / std::max(distance2, near2);
+                p.power * facing(p, to_centre, radius_m) / std::max(glm::dot(to_centre, to_centre), near2);
+            if (!(weight > 0)) continue;
             choices.push_back({static_cast<uint32_t>(i), weight});
             sum += weight;
         }
         if (!(sum > 0)) continue;
-        if (choices.size() <= sorted_max) leaveFaintest(choices, left_share_max * sum);
-        if (choices.size() > choices_max) choices = {};
+        leaveFaintest(choices, left_share_max * sum);
         makeCumulative(choices);
         choices.shrink_to_fit();
-        const uint32_t group = emitters_[range_begin].group;
+        const uint32_t group = groupAt(begin);
         cells_[index].push_back(
             {group, identities_[group], sum, sum > coverage_min * pi * brightest, std::move(choices)});
     }
@@ -207,11 +272,28 @@ std::span<const EmitterSampler::CellGroup> EmitterSampler::groups(uint32_t cell)
     return cells_[cell];
 }
 
+// As within_ is rounded.
+float EmitterSampler::chanceWithin(uint32_t emitter) const {
+    const uint32_t first = patches_[patch_of_emitter_[emitter]].begin;
+    return within_[emitter] - (emitter == first ? 0 : within_[emitter - 1]);
+}
+
 EmitterSample EmitterSampler::sample(const CellGroup& from, glm::vec3 point, float choice, glm::vec2 u) const {
-    const std::span<const Choice> choices = choicesOf(from);
+    const std::span<const Choice> choices = from.choices;
     auto it = std::ranges::upper_bound(choices, choice, {}, &Choice::cumulative);
     if (it == choices.end()) --it;
-    const Emitter& e = emitters_[it->emitter];
+    const auto index = static_cast<size_t>(it - choices.begin());
+    float chance = probability(choices, index);
+    const Patch& patch = patches_[it->patch];
+    uint32_t emitter = patch.begin;
+    if (patch.end - patch.begin > 1) {
+        // What is left of the number that chose the patch.
+        const float rest = (choice - (it->cumulative - chance)) / chance;
+        const auto first = within_.begin() + patch.begin, last = within_.begin() + patch.end;
+        emitter = std::min(static_cast<uint32_t>(std::upper_bound(first, last, rest) - within_.begin()), patch.end - 1);
+        chance *= chanceWithin(emitter);
+    }
+    const Emitter& e = emitters_[emitter];
     const glm::vec2 at = onTriangle(u);
     const glm::vec3 to_target = pointOn(e, at) - point;
     const float distance2 = glm::dot(to_target, to_target);
@@ -221,8 +303,7 @@ EmitterSample EmitterSampler::sample(const CellGroup& from, glm::vec3 point, flo
     float cos_emitter = -glm::dot(direction, e.normal);
     if (e.double_sided) cos_emitter = std::abs(cos_emitter);
     if (!(cos_emitter > 0)) return {};
-    const auto index = static_cast<size_t>(it - choices.begin());
-    const float pdf = probability(choices, index) * distance2 / (e.area_m2 * cos_emitter);
+    const float pdf = chance * distance2 / (e.area_m2 * cos_emitter);
     return {direction, distance, e.radiance_cd_m2, e.triangle, at, pdf};
 }
 
@@ -234,11 +315,12 @@ float EmitterSampler::pdf(uint32_t cell, const Emitter& emitter, float distance_
     const auto index = static_cast<uint32_t>(&emitter - emitters_.data());
     for (const CellGroup& from : groups(cell)) {
         if (from.group != emitter.group) continue;
-        const std::span<const Choice> choices = choicesOf(from);
-        const auto it = std::ranges::lower_bound(choices, index, {}, &Choice::emitter);
-        if (it == choices.end() || it->emitter != index) return 0;
-        return probability(choices, static_cast<size_t>(it - choices.begin())) * distance_m * distance_m /
-               (emitter.area_m2 * std::max(cos_emitter, 1e-6f));
+        const uint32_t patch = patch_of_emitter_[index];
+        const std::span<const Choice> choices = from.choices;
+        const auto it = std::ranges::lower_bound(choices, patch, {}, &Choice::patch);
+        if (it == choices.end() || it->patch != patch) return 0;
+        return probability(choices, static_cast<size_t>(it - choices.begin())) * chanceWithin(index) * distance_m *
+               distance_m / (emitter.area_m2 * std::max(cos_emitter, 1e-6f));
     }
     return 0;
 }

@@ -37,16 +37,17 @@ struct EmitterSample {
 // Rays that each light group's emitters send out to find the cells that they shine into.
 inline constexpr uint32_t emitter_probe_rays = 2048;
 
-// The chance of each emitter, per light group and per cell of a coarse grid: power over squared distance. Groups never
-// compete with one another, so adding a set changes nothing for the others. Cells that a group does not shine into, as
-// far as a few rays tell, or only faintly, do not ask for it; rays that hit its emitters from there count in full, so
-// nothing is lost. Of a group with thousands of emitters, chances are by power alone, for all cells together.
+// The chance of each emitter, per light group and per cell of a coarse grid: power over squared distance, as it faces
+// the cell. Groups never compete with one another, so adding a set changes nothing for the others. Cells that a group
+// does not shine into, as far as a few rays tell, or only faintly, do not ask for it; rays that hit its emitters from
+// there count in full, so nothing is lost. Of a group with thousands of emitters, a cell has a chance for each of some
+// patches that lie and face alike, and within a patch chances are by power.
 class EmitterSampler {
    public:
     EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups);
 
     struct Choice {
-        uint32_t emitter;
+        uint32_t patch;
         float cumulative;  // the chance of this one and of those before it
     };
     // What a cell asks of one group.
@@ -55,7 +56,7 @@ class EmitterSampler {
         uint32_t identity;            // of the group, for seeds
         float light;                  // radiance times solid angle, about
         bool wide;                    // it fills a share of the hemisphere that counts
-        std::vector<Choice> choices;  // by emitter; none where there would be too many: those by power
+        std::vector<Choice> choices;  // ascending by patch
     };
     uint32_t cellAt(glm::vec3 point) const { return grid_.at(point); }
     // The groups worth sampling from `cell`.
@@ -75,20 +76,30 @@ class EmitterSampler {
    private:
     using Cell = std::vector<CellGroup>;
     std::vector<uint8_t> litCells(const RayScene& rays, std::span<const Emitter> of_group) const;
-    // `lit`: per range of emitters of one group, in order, the cells that it shines into.
+    // Emitters of one group, one after another in emitters_.
+    struct Patch {
+        uint32_t begin = 0, end = 0;
+        glm::vec3 centre{0}, normal{0};
+        float radius_m = 0, normal_spread = 0;  // about the centre, and radians about the normal
+        float area_m2 = 0, power = 0, brightest = 0;
+        bool double_sided = false;
+    };
+    void makePatches();
+    void addPatch(uint32_t begin, uint32_t end);
+    // `lit`: per group that has emitters, in order, the cells that it shines into.
     void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);
     void leaveFaintGroups();
-    std::vector<Choice> choicesByPower(uint32_t group) const;
-    std::span<const Choice> choicesOf(const CellGroup& from) const {
-        return from.choices.empty() ? by_power_[from.group] : from.choices;
-    }
+    float chanceWithin(uint32_t emitter) const;  // its patch
+    static float facing(const Patch& patch, glm::vec3 to_centre, float radius_m);
 
     std::vector<Emitter> emitters_;  // sorted by group
+    std::vector<float> within_;      // per emitter: the chance of it and of those before it in its patch
+    std::vector<uint32_t> patch_of_emitter_;
     std::vector<uint32_t> emitter_of_;
+    std::vector<Patch> patches_;        // in the order of their emitters
     std::vector<uint32_t> identities_;  // per light group
     CellGrid grid_;
     std::vector<Cell> cells_;
-    std::vector<std::vector<Choice>> by_power_;  // per light group, where a cell has none of its own
 };
 
 }  // namespace dimmer::cook
