@@ -1,6 +1,8 @@
 // Emissive surfaces as lights of the baker, against form factors.
 #include <bake/baked_scene.h>
+#include <bake/emitters.h>
 #include <bake/reference.h>
+#include <bake/sampling.h>
 #include <bake/test_scenes.h>
 
 namespace dimmer::cook::test {
@@ -100,6 +102,51 @@ TEST(BakeEmitters, ABulbOfManyTrianglesIsASphere) {
     // 0.6 % by which its silhouette differs from a circle, and the noise of points all over a sphere: each gives
     // max(0, cos), 1.3 times its mean off; of 2,048 that leaves 2.9 %, 2.3 % in the mean.
     EXPECT_LT(each, 0.03);
+}
+
+// Two bulbs of 2,208 triangles, one set: 4 m below the one, the other, 30 m off, has a 430th of its light, and half of
+// each looks away. When chances were by power alone, a quarter of the samples met what shines there.
+TEST(Emitters, OfThousandsThoseThatShineHereAreChosen) {
+    Scene scene;
+    constexpr double radius = 0.1, height = 4, apart = 30;
+    addFloor(scene, 31, addMaterial(scene, lambert(0)));
+    const uint32_t glow = addMaterial(scene, emissive(glm::vec3(100)));
+    for (const float x : {0.0f, static_cast<float>(apart)}) {
+        addSphere(scene, radius, 48, 24, glow);
+        SceneMesh& bulb = scene.meshes.back();
+        for (glm::uvec3& t : bulb.triangles) std::swap(t.y, t.z);
+        for (glm::vec3& p : bulb.positions_m) p += glm::vec3(x, height, 0);
+    }
+    const RayScene rays(scene);
+    const EmitterSampler emitters(rays, meshGroups(scene));
+    ASSERT_GT(emitters.emitters().size(), 4000u);
+    const glm::vec3 place(0.1f, 0.001f, 0.1f);
+    const uint32_t cell = emitters.cellAt(place);
+    ASSERT_EQ(emitters.groups(cell).size(), 1u);
+    constexpr uint32_t samples = 20000;
+    uint32_t met = 0;
+    double sum = 0, squares = 0;
+    for (uint32_t i = 0; i < samples; ++i) {
+        const float choice = (static_cast<float>(i) + 0.5f) / samples;
+        const EmitterSample s = emitters.sample(emitters.groups(cell)[0], place, choice, sequence2d(i, 7));
+        if (!(s.pdf > 0)) continue;
+        const Emitter* e = emitters.emitterOf(s.triangle);
+        ASSERT_NE(e, nullptr);
+        const float cos_emitter = -glm::dot(s.direction, e->normal);
+        // As rays that hit it weigh themselves.
+        ASSERT_NEAR(emitters.pdf(cell, *e, s.distance_m, cos_emitter), s.pdf, 1e-4f * s.pdf);
+        met += glm::distance(s.direction, glm::normalize(glm::vec3(0, height, 0) - place)) < 0.2f;
+        const double lux = static_cast<double>(s.radiance_cd_m2.y * std::max(0.0f, s.direction.y) / s.pdf);
+        sum += lux, squares += lux * lux;
+    }
+    EXPECT_GT(met, 0.7 * samples);
+    double expected = 0;
+    for (const double x : {0.0, apart}) {
+        const double d = glm::length(glm::dvec3(x, height, 0) - glm::dvec3(place));
+        expected += 100 * pi_d * radius * radius * (height - 0.001) / (d * d * d);
+    }
+    const double mean = sum / samples, error = std::sqrt((squares / samples - mean * mean) / samples);
+    EXPECT_NEAR(mean, expected, 4 * error + 0.006 * expected);  // its silhouette is no circle by 0.6 %
 }
 
 // A lamp's glowing disc over a yard: a millionth of the hemisphere, and all the light that there is.
