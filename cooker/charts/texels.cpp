@@ -21,7 +21,7 @@ namespace {
 constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
-constexpr uint32_t inside_test_rays = 16;
+constexpr uint32_t inside_test_rays = 16, inside_test_rays_max = 64;  // that tell, and in all
 // There is air where ten of the rays along a surface, nearly, get so far without meeting a back.
 constexpr uint32_t horizon_rays = 16, horizon_open_min = 10;
 constexpr float horizon_sine = 0.1f, horizon_open_m = 1;
@@ -169,13 +169,14 @@ class TexelSampler {
         addReflectance(texel, p, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
-        if (!insideGeometry(p.face, nearest)) {
+        if (!insideGeometry({position, p.face}, Surfaces::All, nearest)) {
             result.points.push_back(p);
             return;
         }
         ++usable.dropped;
         const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
-        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !insideGeometry(p.face, stays))
+        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ &&
+            !insideGeometry({position, p.face}, Surfaces::Walls, stays))
             usable.in_leaf.push_back(p);
     }
 
@@ -202,17 +203,21 @@ class TexelSampler {
     }
 
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
-    // none; more than one, because where solids touch, a ray may as well report the neighbour's front.
-    bool insideGeometry(uint32_t face, auto&& nearest) const {
-        const TangentFrame& f = unwrap_.frames[face];
-        uint32_t backs = 0;
-        for (uint32_t i = 0; i < inside_test_rays; ++i) {
-            if (i == inside_test_rays / 4 && backs == 0) return false;
-            const glm::vec3 d = cosineDirection(sequence2d(i, face));
-            const auto hit = nearest(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
-            backs += hit && hit->back && !doubleSided(hit->triangle);
+    // none. Where solids touch, the one's back and the other's front are in one place, as where rooms without walls'
+    // thickness do: that tells neither.
+    bool insideGeometry(const SamplePoint& at, Surfaces surfaces, auto&& nearest) const {
+        const TangentFrame& f = unwrap_.frames[at.face];
+        uint32_t backs = 0, told = 0;
+        for (uint32_t i = 0; i < inside_test_rays_max && told < inside_test_rays; ++i) {
+            if (i == inside_test_rays / 4 && backs == 0 && told == i) return false;
+            const glm::vec3 d = cosineDirection(sequence2d(i, at.face));
+            const glm::vec3 world = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
+            const auto hit = nearest(world);
+            const bool back = hit && hit->back && !doubleSided(hit->triangle);
+            backs += back;
+            told += back || !hit || !rays_.liesOnBack(*hit, at.position_m, world, surfaces);
         }
-        return 2 * backs > inside_test_rays && !openAround(f, nearest);
+        return 2 * backs > told && !openAround(f, nearest);
     }
 
     // Below a roof of one skin backs are most of what is seen, and air is all around. (Inside a cupboard without its

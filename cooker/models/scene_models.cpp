@@ -16,9 +16,10 @@ namespace {
 // smaller is one texel and a ring of padding eight times as large.
 constexpr size_t few_charts = 32;
 constexpr float small_chart_m2 = 0.04f;
-// What is in the same or in neighbouring cells is one thing; what takes more of them is none that 64 probes stand for.
+// Probes of a grid stand 1.5 m apart at most: what is larger than a large thing, a ground or a vault, is no model.
+constexpr float model_side_max_m = 4;
+// What is in the same or in neighbouring cells is one thing.
 constexpr float cell_m = 0.5f;
-constexpr size_t cells_max = 100'000;
 // No grid is thinner: probes on both sides of a sheet stand apart.
 constexpr float thickness_min_m = 0.1f;
 // Axes whose cosine is larger are sheared.
@@ -42,6 +43,12 @@ bool fallsApart(const Scene& scene, const SceneMesh& mesh) {
     return charts > few_charts && area_m2 < small_chart_m2 * static_cast<float>(charts);
 }
 
+bool isLarge(const SceneMesh& mesh) {
+    glm::vec3 low(std::numeric_limits<float>::infinity()), high = -low;
+    for (const glm::vec3& p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+    return glm::any(glm::greaterThan(high - low, glm::vec3(model_side_max_m)));
+}
+
 // Whether nothing of a mesh is more than a metre from the rest. Things that a tool has merged stand in different rooms,
 // and one grid over them would carry the light of the one into the other.
 bool hangsTogether(const SceneMesh& mesh) {
@@ -51,8 +58,6 @@ bool hangsTogether(const SceneMesh& mesh) {
         const glm::vec3 a = mesh.positions_m[t.x], b = mesh.positions_m[t.y], c = mesh.positions_m[t.z];
         const glm::ivec3 low(glm::floor(glm::min(glm::min(a, b), c) / cell_m)),
             high(glm::floor(glm::max(glm::max(a, b), c) / cell_m));
-        const glm::dvec3 count = glm::dvec3(high) - glm::dvec3(low) + 1.0;
-        if (cells.size() > cells_max || count.x * count.y * count.z > cells_max) return false;
         for (int x = low.x; x <= high.x; ++x)
             for (int y = low.y; y <= high.y; ++y)
                 for (int z = low.z; z <= high.z; ++z) cells.insert({x, y, z});
@@ -144,8 +149,8 @@ void chooseLighting(Scene& scene) {
     std::vector<SceneMesh*> by_grids;
     for (SceneMesh& mesh : scene.meshes) {
         if (mesh.lighting != Lighting::Automatic) continue;
-        const bool grid =
-            !mesh.door && !mesh.light_set && mesh.uv1.empty() && fallsApart(scene, mesh) && hangsTogether(mesh);
+        const bool grid = !mesh.door && !mesh.light_set && mesh.uv1.empty() && !isLarge(mesh) &&
+                          fallsApart(scene, mesh) && hangsTogether(mesh);
         mesh.lighting = grid ? Lighting::LocalGrid : Lighting::Lightmap;
         if (grid) by_grids.push_back(&mesh);
     }

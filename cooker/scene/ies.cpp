@@ -78,10 +78,11 @@ class Reader {
         return ok() ? static_cast<int>(value) : 0;
     }
 
-    // But for the end-of-file mark of old systems. Numbers that are left mean that a count is wrong.
+    // But for the end-of-file mark of old systems, and a keyword, as some programs write [EOF]. Numbers that are left
+    // mean that a count is wrong.
     void expectEnd(std::string_view what) {
         const std::string_view token = nextToken();
-        if (!token.empty() && token != "\x1a")
+        if (!token.empty() && token != "\x1a" && !token.starts_with('['))
             refuse(token_line_,
                    fmt::format("'{:.20}' follows {}. Correct the numbers of angles, or remove it.", token, what));
     }

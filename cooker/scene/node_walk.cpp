@@ -1,5 +1,6 @@
 #include <scene/node_walk.h>
 
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <ranges>
 
@@ -43,9 +44,11 @@ Expected<glm::dmat4> matrixOf(const ImportContext& context, int node, const std:
     if (values.size() != 16) return malformed(context, node, "matrix is not sixteen numbers.");
     glm::dmat4 matrix;
     for (int i = 0; i < 16; ++i) matrix[i / 4][i % 4] = values[static_cast<size_t>(i)];
-    if (matrix[0][3] != 0 || matrix[1][3] != 0 || matrix[2][3] != 0 || matrix[3][3] != 1)
+    constexpr double rounding = 1e-5;
+    const glm::dvec4 last_row(0, 0, 0, 1), off = glm::abs(glm::row(matrix, 3) - last_row);
+    if (!glm::all(glm::lessThan(off, glm::dvec4(rounding))))
         return malformed(context, node, "matrix has a last row other than 0 0 0 1.");
-    return matrix;
+    return glm::row(matrix, 3, last_row);
 }
 
 Expected<glm::dmat4> localTransform(const ImportContext& context, int index) {

@@ -4,10 +4,12 @@
 #include <scene/radiance_image.h>
 
 #include <ImfChannelList.h>
+#include <ImfChromaticities.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
+#include <ImfStandardAttributes.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -85,6 +87,18 @@ Expected<Image> displayed(Image kept, const Imath::Box2i& window, const Imath::B
     return image;
 }
 
+// To Rec.709, where the file's primaries are others (ACES, say). What lies outside of it becomes negative.
+void toRec709(const Imf::Header& header, Image& image) {
+    if (!Imf::hasChromaticities(header)) return;
+    const Imf::Chromaticities own = Imf::chromaticities(header), rec709;  // the library's default
+    if (own == rec709) return;
+    const Imath::M44f to_709 = Imf::RGBtoXYZ(own, 1) * Imf::XYZtoRGB(rec709, 1);
+    for (glm::vec4& texel : image.texels) {
+        const Imath::V3f rgb = Imath::V3f(texel.x, texel.y, texel.z) * to_709;
+        texel = {rgb.x, rgb.y, rgb.z, texel.w};
+    }
+}
+
 Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::string& file) {
     try {
         // A hostile header must not make the library reserve a table of four billion rows.
@@ -108,6 +122,7 @@ Expected<Image> decodeOpenExr(std::span<const unsigned char> bytes, const std::s
                                           sizeof(glm::vec4), row_bytes));
         input.setFrameBuffer(frame);
         input.readPixels(window.min.y, window.max.y);
+        toRec709(input.header(), *image);
         return displayed(std::move(*image), window, input.header().displayWindow(), file);
     } catch (const std::bad_alloc&) {
         throw;  // importLevel says what that means

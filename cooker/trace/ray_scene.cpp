@@ -66,12 +66,18 @@ struct Facing {
     const TrianglesOfKinds& triangle_of;
 };
 
-void leaveOutBacks(const RTCFilterFunctionNArguments* args) {
+bool isBack(const RTCFilterFunctionNArguments* args) {
     const auto* const asked = reinterpret_cast<const Facing*>(args->context);
     const auto* const ray = reinterpret_cast<const RTCRay*>(args->ray);
     const auto* const hit = reinterpret_cast<const RTCHit*>(args->hit);
     const LevelTriangle& triangle = asked->collector.triangles[asked->triangle_of[hit->geomID][hit->primID]];
-    if (glm::dot(glm::vec3(ray->dir_x, ray->dir_y, ray->dir_z), triangle.normal) > 0) args->valid[0] = 0;
+    return glm::dot(glm::vec3(ray->dir_x, ray->dir_y, ray->dir_z), triangle.normal) > 0;
+}
+void leaveOutBacks(const RTCFilterFunctionNArguments* args) {
+    if (isBack(args)) args->valid[0] = 0;
+}
+void leaveOutFronts(const RTCFilterFunctionNArguments* args) {
+    if (!isBack(args)) args->valid[0] = 0;
 }
 
 void collect(const RTCFilterFunctionNArguments* args) {
@@ -188,15 +194,21 @@ struct RayScene::Embree {
         return ray_hit.hit.geomID != RTC_INVALID_GEOMETRY_ID;
     }
 
+    // What else is met at a distance, but for what the filter leaves out.
+    bool meet(RTCRayHit& other, glm::vec3 origin, glm::vec3 direction, float distance_m, uint32_t ignored,
+              RTCFilterFunctionN leave_out) const {
+        const float apart_m = skinsApart(distance_m);
+        prepare(other, origin, direction, std::max(0.0f, distance_m - apart_m), distance_m + apart_m, mask_opaque);
+        Facing facing{Collector(nullptr, triangles, ignored), triangle_of};
+        facing.collector.context.filter = leave_out;
+        rtcIntersect1(scene, &facing.collector.context, &other);
+        return other.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    }
+
     // A front in the plane of a back that was met. `ray_hit`: as it was where there is none.
     void preferFront(RTCRayHit& ray_hit, glm::vec3 origin, glm::vec3 direction, uint32_t ignored) const {
-        const float distance_m = ray_hit.ray.tfar, apart_m = skinsApart(distance_m);
         RTCRayHit front;
-        prepare(front, origin, direction, std::max(0.0f, distance_m - apart_m), distance_m + apart_m, mask_opaque);
-        Facing facing{Collector(nullptr, triangles, ignored), triangle_of};
-        facing.collector.context.filter = leaveOutBacks;
-        rtcIntersect1(scene, &facing.collector.context, &front);
-        if (front.hit.geomID != RTC_INVALID_GEOMETRY_ID) ray_hit = front;
+        if (meet(front, origin, direction, ray_hit.ray.tfar, ignored, leaveOutBacks)) ray_hit = front;
     }
 
     bool occluded(glm::vec3 origin, glm::vec3 direction, float far_m, unsigned mask, uint32_t ignored,
@@ -305,6 +317,14 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     }
     if (leaves) finish(*leaves, direction, found ? found->distance_m : distance_max_m);
     return found;
+}
+
+bool RayScene::liesOnBack(const Hit& hit, glm::vec3 origin, glm::vec3 direction, Surfaces surfaces) const {
+    const Embree& among = embree(surfaces);
+    RTCRayHit back;
+    if (!among.meet(back, origin, direction, hit.distance_m, no_model, leaveOutFronts)) return false;
+    const uint32_t triangle = among.triangle_of[back.hit.geomID][back.hit.primID];
+    return !scene_.materials[triangles_[triangle].material].double_sided;
 }
 
 float RayScene::reach(glm::vec3 origin, glm::vec3 direction, float distance_max_m, Surfaces surfaces) const {

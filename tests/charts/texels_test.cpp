@@ -6,8 +6,10 @@
 #include <scene/open_pose.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <ranges>
+#include <set>
 
 namespace dimmer::cook::test {
 namespace {
@@ -115,6 +117,83 @@ TEST(Texels, OfAFloorBelowFurnitureAreNone) {
         const auto within = [](glm::vec3 p) { return std::abs(p.x + 1.5f) < 0.25f && std::abs(p.z) < 0.75f; };
         EXPECT_EQ(receiversWhere(rays, *charts, texels, "floor", within), 0u) << closed;
     }
+}
+
+// About the vertical, as a level that is not along the axes: its planes differ by rounding.
+void turn(Scene& scene, float angle) {
+    const auto turned = [&](glm::vec3 p) {
+        return glm::vec3(std::cos(angle) * p.x + std::sin(angle) * p.z, p.y,
+                         std::cos(angle) * p.z - std::sin(angle) * p.x);
+    };
+    for (SceneMesh& mesh : scene.meshes) {
+        for (glm::vec3& p : mesh.positions_m) p = turned(p);
+        for (glm::vec3& n : mesh.normals) n = turned(n);
+    }
+}
+
+// Stairs of boxes, each as high as its step and touching the next: all around a point in one of them lies the back of
+// it and, in the same place, the front of another. Risers were black where a texel holds more of the hidden part.
+TEST(Texels, OfStepsThatTouchSeeTheRoom) {
+    for (const float angle : {0.0f, 0.12f})
+        for (const float texels_per_metre : {2.0f, 4.0f}) {
+            Scene scene;
+            const uint32_t grey = addMaterial(scene, lambert(0.5f));
+            constexpr float rise = 0.18f, run = 0.28f;
+            constexpr int steps = 12;
+            addQuad(scene, "floor", {0, 0, 0}, {0, 0, 4}, {6, 0, 0}, grey);
+            addQuad(scene, "wall", {0, 1.5f, -0.6f}, {6, 0, 0}, {0, 1.5f, 0}, grey);
+            for (int i = 0; i < steps; ++i)
+                addSolid(scene, i < 10 ? "step" : "top",
+                         {run * (static_cast<float>(i) + 0.5f), rise * 0.5f * static_cast<float>(i + 1), 0},
+                         {run / 2, rise * 0.5f * static_cast<float>(i + 1), 0.6f}, grey);
+            turn(scene, angle);
+            const RayScene rays(scene);
+            const auto charts = unwrap(rays, {.texels_per_metre = texels_per_metre, .page_size = 512});
+            ASSERT_TRUE(charts.has_value());
+            const Texels texels = sampleTexels(rays, *charts, 4);
+            const glm::vec3 forth(-std::cos(angle), 0, std::sin(angle));  // risers face there
+            std::set<int> risers;
+            for (size_t i = 0; i < texels.size(); ++i) {
+                const SamplePoint p = samplePoint(rays, *charts, texels, i, 0);
+                if (glm::dot(charts->frames[p.face].normal, forth) < 0.9f) continue;
+                if (rays.scene().meshes[rays.triangles()[charts->faces[p.face].triangle].mesh].node == "wall") continue;
+                const int step = static_cast<int>(std::lround(-glm::dot(p.position_m, forth) / run));
+                for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
+                    const float y = samplePoint(rays, *charts, texels, i, s).position_m.y;
+                    EXPECT_GT(y, rise * static_cast<float>(step) - 1e-3f) << step << " of " << angle;
+                }
+                risers.insert(step);
+            }
+            EXPECT_EQ(risers.size(), size_t{steps}) << angle << " " << texels_per_metre;
+        }
+}
+
+// A room between six others, all inward boxes that share their planes: nothing tells it from a solid between solids but
+// that no back is seen alone. It is a room.
+TEST(Texels, OfRoomsWithoutWallsThicknessAreLit) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    const auto addRoomAt = [&](glm::vec3 centre, const char* node) {
+        const size_t first = scene.meshes.size();
+        addBox(scene, glm::vec3(1.5f), grey);
+        for (size_t m = first; m < scene.meshes.size(); ++m) {
+            scene.meshes[m].node = node;
+            for (glm::vec3& p : scene.meshes[m].positions_m) p += centre;
+        }
+    };
+    addRoomAt({0, 0, 0}, "middle");
+    for (int axis = 0; axis < 3; ++axis)
+        for (const float side : {-3.0f, 3.0f}) {
+            glm::vec3 centre(0);
+            centre[axis] = side;
+            addRoomAt(centre, "other");
+        }
+    turn(scene, 0.3f);
+    const RayScene rays(scene);
+    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 512});
+    ASSERT_TRUE(charts.has_value());
+    const Texels texels = sampleTexels(rays, *charts, 4);
+    EXPECT_GE(receiversWhere(rays, *charts, texels, "middle", [](glm::vec3) { return true; }), 6u * 12u * 12u);
 }
 
 // Pages mix what lies far apart: a bake goes from place to place all the same, and each is one run of receivers.

@@ -90,6 +90,15 @@ TEST(SceneGeometry, NodesMoveRotateAndScaleInThatOrderDownTheTree) {
     expectNear(wall.positions_m[2], {38, 19.5f, -11}, 1e-4f);
     expectNear(wall.normals[2], {1, 0, 0});
     expectNear(faceNormal(wall, 0), {1, 0, 0});
+    // A last row that a tool rounded is none.
+    json& matrix = level.document["nodes"].back()["matrix"];
+    matrix[15] = 0.99999994;
+    matrix[3] = 1e-8;
+    const auto rounded = level.import();
+    ASSERT_IMPORTED(rounded);
+    EXPECT_EQ(rounded->meshes[1].positions_m, wall.positions_m);
+    matrix[15] = 0.999;
+    expectBadInput(level.import(), {"node 'wall'", "matrix"});
 }
 
 TEST(SceneGeometry, NormalsTurnWithTheInverseTranspose) {

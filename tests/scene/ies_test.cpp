@@ -258,6 +258,11 @@ TEST(SceneIesFile, BadFilesAreRefusedWithTheirLine) {
         EXPECT_FALSE(parseLightProfile(text, "lamp.ies").has_value()) << text;
 }
 
+TEST(SceneIesFile, MarksBehindTheLastValueAreNone) {
+    for (const char* mark : {"\x1a", "[EOF]", "\r\n[END] of file\r\n"})
+        EXPECT_TRUE(parseLightProfile(Ies().text() + mark, "lamp.ies").has_value()) << mark;
+}
+
 // Bytes changed, removed and cut off at random: a usable profile or a message with its place.
 TEST(SceneIesFile, DamagedFilesNeverCrash) {
     std::mt19937 random(11);

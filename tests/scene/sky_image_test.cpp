@@ -3,6 +3,7 @@
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
 #include <ImfOutputFile.h>
+#include <ImfStandardAttributes.h>
 #include <scene/expectations.h>
 #include <scene/sky.h>
 
@@ -33,9 +34,11 @@ std::string radianceRuns(uint8_t width, uint32_t height) {
 
 // `window_x`, `window_y`: where the data window begins. `display`: where the picture lies, if not there.
 void writeOpenExr(const std::filesystem::path& path, int width, int height, const std::vector<glm::vec4>& rgba,
-                  int window_x = 0, int window_y = 0, std::optional<Imath::Box2i> display = {}) {
+                  int window_x = 0, int window_y = 0, std::optional<Imath::Box2i> display = {},
+                  std::optional<Imf::Chromaticities> primaries = {}) {
     const Imath::Box2i window({window_x, window_y}, {window_x + width - 1, window_y + height - 1});
     Imf::Header header(display.value_or(window), window);
+    if (primaries) Imf::addChromaticities(header, *primaries);
     Imf::FrameBuffer frame;
     for (int c = 0; const char* name : {"R", "G", "B"}) {
         header.channels().insert(name, Imf::Channel(Imf::FLOAT));
@@ -103,6 +106,24 @@ TEST(SceneSkyImage, OpenExrWithAnotherDisplayWindow) {
     EXPECT_EQ(redOf({{13, 22}, {14, 23}}), (std::vector<float>{12, 0, 0, 0}));
     EXPECT_EQ(redOf({{30, 20}, {31, 20}}), (std::vector<float>{0, 0}));
     EXPECT_EQ(redOf({{10, 30}, {10, 31}}), (std::vector<float>{0, 0}));
+}
+
+// Luminance is the same in all primaries: of AP0 (SMPTE ST 2065-1) it is 0.34397 R + 0.72817 G - 0.07213 B.
+TEST(SceneSkyImage, OpenExrOfOtherPrimariesIsConverted) {
+    const TemporaryFolder folder;
+    const std::vector<glm::vec4> texels = {{1, 1, 1, 0}, {0.4f, 0.5f, 0.45f, 0}};
+    const Imf::Chromaticities ap0({0.7347f, 0.2653f}, {0, 1}, {0.0001f, -0.077f}, {0.32168f, 0.33767f});
+    writeOpenExr(folder.path / "sky.exr", 2, 1, texels, 0, 0, {}, ap0);
+    const auto image = readSkyImage(folder.path / "sky.exr");
+    ASSERT_TRUE(image.has_value()) << image.error().message;
+    const double wanted[] = {1, 0.34397 * 0.4 + 0.72817 * 0.5 - 0.07213 * 0.45};
+    for (size_t i = 0; i < 2; ++i) {
+        const glm::vec4 t = image->texels[i];
+        EXPECT_NEAR(0.2126f * t.x + 0.7152f * t.y + 0.0722f * t.z, wanted[i], 2e-4) << i;
+    }
+    EXPECT_GT(image->texels[0].x, image->texels[0].z);  // its white is of 6,000 K, a little warmer
+    writeOpenExr(folder.path / "sky.exr", 2, 1, texels, 0, 0, {}, Imf::Chromaticities());
+    EXPECT_EQ(glm::vec3(readSkyImage(folder.path / "sky.exr")->texels[1]), glm::vec3(0.4f, 0.5f, 0.45f));
 }
 
 TEST(SceneSkyImage, InALevel) {
