@@ -21,7 +21,7 @@ namespace {
 constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
-constexpr uint32_t inside_test_rays = 16, inside_test_rays_max = 64;  // that tell, and in all
+constexpr uint32_t inside_test_rays = 16;
 // There is air where ten of the rays along a surface, nearly, get so far without meeting a back.
 constexpr uint32_t horizon_rays = 16, horizon_open_min = 10;
 constexpr float horizon_sine = 0.1f, horizon_open_m = 1;
@@ -204,20 +204,30 @@ class TexelSampler {
 
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
     // none. Where solids touch, the one's back and the other's front are in one place, as where rooms without walls'
-    // thickness do: that tells neither.
+    // thickness do: that tells neither, and where most is so, rays along the surface tell more.
     bool insideGeometry(const SamplePoint& at, Surfaces surfaces, auto&& nearest) const {
         const TangentFrame& f = unwrap_.frames[at.face];
         uint32_t backs = 0, told = 0;
-        for (uint32_t i = 0; i < inside_test_rays_max && told < inside_test_rays; ++i) {
-            if (i == inside_test_rays / 4 && backs == 0 && told == i) return false;
-            const glm::vec3 d = cosineDirection(sequence2d(i, at.face));
-            const glm::vec3 world = f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
-            const auto hit = nearest(world);
+        const auto look = [&](glm::vec3 direction) {
+            const auto hit = nearest(direction);
             const bool back = hit && hit->back && !doubleSided(hit->triangle);
             backs += back;
-            told += back || !hit || !rays_.liesOnBack(*hit, at.position_m, world, surfaces);
+            told += back || !hit || !rays_.liesOnBack(*hit, at.position_m, direction, surfaces);
+        };
+        for (uint32_t i = 0; i < inside_test_rays; ++i) {
+            if (i == inside_test_rays / 4 && backs == 0 && told == i) return false;
+            const glm::vec3 d = cosineDirection(sequence2d(i, at.face));
+            look(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
         }
+        if (told < inside_test_rays / 2)
+            for (uint32_t i = 0; i < horizon_rays; ++i) look(alongSurface(f, i));
         return 2 * backs > told && !openAround(f, nearest);
+    }
+
+    static glm::vec3 alongSurface(const TangentFrame& f, uint32_t i) {
+        const float angle = 2 * pi * static_cast<float>(i) / horizon_rays;
+        const glm::vec3 along = std::cos(angle) * f.tangent + std::sin(angle) * f.bitangent;
+        return std::sqrt(1 - horizon_sine * horizon_sine) * along + horizon_sine * f.normal;
     }
 
     // Below a roof of one skin backs are most of what is seen, and air is all around. (Inside a cupboard without its
@@ -225,9 +235,7 @@ class TexelSampler {
     bool openAround(const TangentFrame& f, auto&& nearest) const {
         uint32_t open = 0;
         for (uint32_t i = 0; i < horizon_rays && open < horizon_open_min; ++i) {
-            const float angle = 2 * pi * static_cast<float>(i) / horizon_rays;
-            const glm::vec3 along = std::cos(angle) * f.tangent + std::sin(angle) * f.bitangent;
-            const auto hit = nearest(std::sqrt(1 - horizon_sine * horizon_sine) * along + horizon_sine * f.normal);
+            const auto hit = nearest(alongSurface(f, i));
             const bool stopped_by_back = hit && hit->back && !doubleSided(hit->triangle);
             open += !stopped_by_back && !(hit && hit->distance_m < horizon_open_m);
         }
