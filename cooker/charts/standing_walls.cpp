@@ -28,7 +28,9 @@ constexpr float skins_per_m = 1;           // places at which is looked what is 
 constexpr int skins_min = 3, skins_max = 16;
 constexpr float thick_m = 1;         // of solids: farther behind a face, a back is another wall's
 constexpr float room_min_m = 0.25f;  // between skins: less is no room
-constexpr float first_step_m = 1;    // of a ray; twice as far each time
+// Feet of walls, and how far their pieces may lie apart, along them and, of their thickness, across.
+constexpr float foot_min_m = 0.25f, foot_length_min = 2, foot_gap_m = 0.02f, same_foot = 0.25f;
+constexpr float first_step_m = 1;  // of a ray; twice as far each time
 
 float largest(glm::vec3 p) {
     return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
@@ -131,16 +133,32 @@ PlanarChart StandingWalls::turned(const PlanarChart& chart, Turn turn) const {
     return other;
 }
 
+auto StandingWalls::placeOf(const Trace& trace) {
+    return std::tuple(trace.axis, trace.forward, trace.at);
+}
+
 std::vector<WallLine> StandingWalls::alongAxes(const PlanarChart& chart, float reach_m) const {
-    const std::vector<Trace> traces =
-        standing(lowTraces(chart), joinedTraces(findTraces(chart, highProbe(chart), Which::All)));
+    std::vector<Trace> low = lowTraces(chart), high = joinedTraces(findTraces(chart, highProbe(chart), Which::All));
+    std::ranges::sort(low, {}, placeOf);
+    std::ranges::sort(high, {}, placeOf);
+    const std::vector<Trace> traces = standing(low, high);
     std::vector<WallLine> lines;
-    for (const Trace& a : traces) {
-        if (isSkin(chart, a)) lines.push_back(a);
+    for (const Trace& trace : traces)
+        if (isSkin(chart, trace)) lines.push_back(trace);
+    std::vector<Solid> solids = solidsOf(traces, reach_m);
+    const std::vector<Solid> feet = solidsBelow(solidsOf(high, reach_m), solidsOf(low, reach_m), reach_m);
+    solids.insert(solids.end(), feet.begin(), feet.end());
+    for (const Solid& s : solids) lines.push_back({s.axis, 0.5f * (s.low + s.high), s.from, s.to});
+    return joined(std::move(lines));
+}
+
+// Stretch by stretch. Of traces in the order of placeOf.
+std::vector<StandingWalls::Solid> StandingWalls::solidsOf(std::span<const Trace> sorted, float reach_m) {
+    std::vector<Solid> solids;
+    for (const Trace& a : sorted) {
         if (a.forward) continue;
-        // A solid between a's front, looking back, and the next that looks forward, stretch by stretch.
         std::vector<glm::vec2> open{{a.from, a.to}};
-        for (const Trace& b : near(traces, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
+        for (const Trace& b : near(sorted, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
             if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
             std::vector<glm::vec2> left;
             for (const glm::vec2 stretch : open) {
@@ -149,7 +167,7 @@ std::vector<WallLine> StandingWalls::alongAxes(const PlanarChart& chart, float r
                     left.push_back(stretch);
                     continue;
                 }
-                lines.push_back({a.axis, 0.5f * (a.at + b.at), from, to});
+                solids.push_back({a.axis, a.at, b.at, from, to});
                 left.push_back({stretch.x, from});
                 left.push_back({to, stretch.y});
             }
@@ -158,7 +176,46 @@ std::vector<WallLine> StandingWalls::alongAxes(const PlanarChart& chart, float r
             if (open.empty()) break;
         }
     }
-    return joined(std::move(lines));
+    return solids;
+}
+
+// What of the low ones has a high one above it: the foot of a wall, which a skirting makes thicker, or a moulding.
+std::vector<StandingWalls::Solid> StandingWalls::solidsBelow(std::span<const Solid> high, std::span<const Solid> low,
+                                                             float reach_m) {
+    const auto placeOfSolid = [](const Solid& s) { return std::pair(s.axis, s.low); };
+    std::vector<Solid> sorted(high.begin(), high.end()), below;
+    std::ranges::sort(sorted, {}, placeOfSolid);
+    for (const Solid& a : low) {
+        const auto first = std::ranges::lower_bound(sorted, std::pair(a.axis, a.low - reach_m), {}, placeOfSolid);
+        for (auto b = first; b != sorted.end() && b->axis == a.axis && b->low <= a.high + same_line_m; ++b) {
+            const float from = std::max(a.from, b->from), to = std::min(a.to, b->to);
+            if (b->high >= a.low - same_line_m && to - from > same_line_m)
+                below.push_back({a.axis, a.low, a.high, from, to});
+        }
+    }
+    return longOnes(std::move(below));
+}
+
+// Pieces of one foot together, as a rough wall has many; legs of chairs and the like are left out.
+std::vector<StandingWalls::Solid> StandingWalls::longOnes(std::vector<Solid> solids) {
+    std::ranges::sort(solids, {}, [](const Solid& s) { return std::tuple(s.axis, s.from, s.to, s.low, s.high); });
+    std::vector<Solid> joined;
+    for (const Solid& s : solids) {
+        const auto goesOn = [&](const Solid& other) {
+            const float apart_m = 0.5f * std::abs(s.low + s.high - other.low - other.high);
+            return other.axis == s.axis && s.from <= other.to + foot_gap_m &&
+                   apart_m <= std::max(same_line_m, same_foot * std::min(s.high - s.low, other.high - other.low));
+        };
+        const auto other = std::ranges::find_if(joined, goesOn);
+        if (other == joined.end())
+            joined.push_back(s);
+        else
+            other->to = std::max(other->to, s.to);
+    }
+    std::erase_if(joined, [](const Solid& s) {
+        return s.to - s.from < std::max(foot_min_m, foot_length_min * (s.high - s.low));
+    });
+    return joined;
 }
 
 // A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
@@ -194,10 +251,6 @@ float StandingWalls::highProbe(const PlanarChart& chart) const {
     return wall_probe_high_m;
 }
 
-auto StandingWalls::placeOf(const Trace& trace) {
-    return std::tuple(trace.axis, trace.forward, trace.at);
-}
-
 // Of traces in the order of placeOf, those between two places and perhaps a few more.
 std::span<const StandingWalls::Trace> StandingWalls::near(std::span<const Trace> sorted, int axis, bool forward,
                                                           float low, float high) {
@@ -206,9 +259,9 @@ std::span<const StandingWalls::Trace> StandingWalls::near(std::span<const Trace>
                                             placeOf)};
 }
 
-// What is there at both heights, in one plane.
-std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trace>& low, std::vector<Trace> high) {
-    std::ranges::sort(high, {}, placeOf);
+// What is there at both heights, in one plane. Of traces in the order of placeOf.
+std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trace>& low,
+                                                          const std::vector<Trace>& high) {
     std::vector<Trace> both;
     for (const Trace& a : low) {
         const float leans_m = high.empty() ? 0 : a.lean * (high[0].height_m - a.height_m);

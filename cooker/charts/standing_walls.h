@@ -53,7 +53,8 @@ class StandingWalls {
 
     // The middles of solids that are thinner than a filtered texel of the coarsest density reaches, and single skins
     // with open air behind them, over which the chart goes on. Each stands on the chart at wall_probe_low_m (leaves at
-    // leaf_probe_low_m), and at wall_probe_high_m or as high as there is room, leaning or not. Cost: that of the faces
+    // leaf_probe_low_m), and at wall_probe_high_m or as high as there is room, leaning or not; a solid may have another
+    // outline there, as over a skirting. Cost: that of the faces
     // at the two heights over the chart for each pair of directions at right angles that they have, and of some rays
     // behind each single-sided wall.
     WallLines on(const PlanarChart& chart, float coarsest_texels_per_metre) const;
@@ -79,11 +80,19 @@ class StandingWalls {
         // Metres to the line that both ends may lie beside, of a chart of so many texels per metre.
         float slackM(float texels_per_metre) const;
     };
+    // Between a face that looks back and the next that looks forward, at a height over a chart.
+    struct Solid {
+        int axis = 0;
+        float low = 0, high = 0, from = 0, to = 0;  // across the axis' line, and along it
+    };
     enum class Which { Fixed, Leaves, All };
 
     static auto placeOf(const Trace& trace);
     static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high);
-    static std::vector<Trace> standing(const std::vector<Trace>& low, std::vector<Trace> high);
+    static std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Trace>& high);
+    static std::vector<Solid> solidsOf(std::span<const Trace> sorted, float reach_m);
+    static std::vector<Solid> solidsBelow(std::span<const Solid> high, std::span<const Solid> low, float reach_m);
+    static std::vector<Solid> longOnes(std::vector<Solid> solids);
     static std::vector<Trace> joinedTraces(std::vector<Trace> traces);
     std::vector<WallLine> alongAxes(const PlanarChart& chart, float reach_m) const;
     std::vector<Turn> turnsOf(const PlanarChart& chart) const;
