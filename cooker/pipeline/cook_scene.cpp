@@ -60,7 +60,7 @@ void warnOfPlaces(const Receivers& at, CookStats& stats) {
     stats.warnings.insert(stats.warnings.end(), buried.begin(), buried.end());
     if (auto warning = farFromOrigin(*level.rays)) stats.warnings.push_back(std::move(*warning));
     if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
-    if (auto warning = tooSmallForTexels(level.scene, level.charts, at.texels))
+    if (auto warning = tooSmallForTexels(*level.rays, level.charts, at.texels))
         stats.warnings.push_back(std::move(*warning));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(

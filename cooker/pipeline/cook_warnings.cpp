@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace dimmer::cook {
 
@@ -71,13 +72,27 @@ std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwr
            "lights have an intensity of 0";
 }
 
-std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels) {
+// The middle one of its box's sides.
+float widthM(const SceneMesh& mesh) {
+    glm::vec3 low(std::numeric_limits<float>::infinity()), high = -low;
+    for (const glm::vec3& p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+    const glm::vec3 side = high - low;
+    return std::max(std::min(side.x, side.y), std::min(std::max(side.x, side.y), side.z));
+}
+
+std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
+    const Scene& scene = rays.scene();
     constexpr uint32_t padding = 1, few_texels = 3;
+    std::vector<float> widths_m;  // of meshes: of ground in fine triangles charts are narrow, and it is not
+    for (const SceneMesh& mesh : scene.meshes) widths_m.push_back(widthM(mesh));
     double all_m2 = 0, narrow_m2 = 0;
     for (size_t i = 0; i < texels.size(); ++i) {
-        const Chart& chart = unwrap.charts[unwrap.face_chart[texels.face(i)]];
+        const uint32_t face = texels.face(i);
+        const Chart& chart = unwrap.charts[unwrap.face_chart[face]];
+        const float width_m = widths_m[rays.triangles()[unwrap.faces[face].triangle].mesh];
         all_m2 += static_cast<double>(texels.area_m2[i]);
-        if (std::min(chart.width, chart.height) < few_texels + 2 * padding)
+        if (std::min(chart.width, chart.height) < few_texels + 2 * padding &&
+            width_m < static_cast<float>(few_texels) * std::sqrt(unwrap.texel_area_m2[face]))
             narrow_m2 += static_cast<double>(texels.area_m2[i]);
     }
     if (!(narrow_m2 > 0.5 * all_m2)) return {};

@@ -28,7 +28,7 @@ std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwr
                                         double energy_lm);
 
 // Most of the level is narrower than a few texels: it is in another unit, mostly.
-std::optional<std::string> tooSmallForTexels(const Scene& scene, const Unwrap& unwrap, const Texels& texels);
+std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
 
 // Of the command line's settings for another quality, which do nothing.
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);

@@ -451,7 +451,7 @@ TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
         scene.file = "level.glb";
         addBox(scene, glm::vec3(2, 1.2f, 2) * scale, addMaterial(scene, lambert(0.5f)));
         const BakedScene b(scene, 4, 4);
-        const auto warning = tooSmallForTexels(b.scene, b.charts, b.texels);
+        const auto warning = tooSmallForTexels(*b.rays, b.charts, b.texels);
         EXPECT_EQ(warning.has_value(), scale < 1) << scale;
         if (!warning) continue;
         EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("in metres,")));
