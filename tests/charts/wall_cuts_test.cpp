@@ -131,6 +131,21 @@ TEST(WallCuts, WallsPartRoomsHoweverTheyStand) {
         {"leans", moved([](glm::vec3 p) { return 0.02f * (p.y / 2.7f - 0.5f); })},
         {"askew", moved([](glm::vec3 p) { return 0.01f * p.z; })},
         {"is no receiver", lit(Lighting::None)},
+        // Each let up to 72 % of the bright room's light past: no face of it is in one plane low and high.
+        {"has skirtings",
+         [](Scene& scene) {
+             for (SceneMesh& mesh : scene.meshes)
+                 if (mesh.node == "wall")
+                     for (glm::vec3& p : mesh.positions_m) p.y = std::max(p.y, 0.1f);
+             addSolid(scene, "wall", {0, 0.05f, 0}, {0.095f, 0.05f, 1.5f}, 0);
+         }},
+        {"stands on a strip",
+         [](Scene& scene) {
+             for (SceneMesh& mesh : scene.meshes)
+                 if (mesh.node == "wall")
+                     for (glm::vec3& p : mesh.positions_m) p.y = std::max(p.y, 0.1f);
+             addSolid(scene, "strip", {0, 0.05f, 0}, {0.02f, 0.05f, 1.5f}, 0);
+         }},
         {"has a grid of its own", lit(Lighting::LocalGrid)},
     };
     for (const auto& [name, change] : ways) {

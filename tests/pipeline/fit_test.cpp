@@ -458,6 +458,32 @@ TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
     }
 }
 
+// Ground of 10 m in triangles of 25 cm, no two in one plane: its charts are narrow, and it is not.
+TEST(TooSmallForTexels, IsNotSaidOfFineTriangles) {
+    Scene scene;
+    SceneMesh& ground = addFloor(scene, 5, addMaterial(scene, lambert(0.5f)));
+    ground.positions_m.clear(), ground.normals.clear(), ground.uv1.clear();
+    ground.triangles.clear(), ground.triangle_materials.clear();
+    constexpr uint32_t cells = 40;
+    for (uint32_t j = 0; j <= cells; ++j)
+        for (uint32_t i = 0; i <= cells; ++i) {
+            const float x = 0.25f * static_cast<float>(i) - 5, z = 0.25f * static_cast<float>(j) - 5;
+            ground.positions_m.push_back({x, 0.05f * std::sin(3 * x + 5 * z), z});
+            ground.normals.push_back({0, 1, 0});
+        }
+    for (uint32_t j = 0; j < cells; ++j)
+        for (uint32_t i = 0; i < cells; ++i) {
+            const uint32_t a = j * (cells + 1) + i, b = a + 1, c = a + cells + 1;
+            ground.triangles.push_back({a, c, b});
+            ground.triangles.push_back({b, c, c + 1});
+            ground.triangle_materials.insert(ground.triangle_materials.end(), 2, 0);
+        }
+    ground.lighting = Lighting::Lightmap;
+    const BakedScene b(scene, 4, 4);
+    ASSERT_GT(b.charts.charts.size(), 1000u);
+    EXPECT_FALSE(tooSmallForTexels(*b.rays, b.charts, b.texels));
+}
+
 TEST(FarFromOrigin, IsSaidOfLevelsFarOff) {
     for (const float at_m : {0.0f, 1500.0f, -5000.0f}) {
         Scene scene;
