@@ -19,7 +19,7 @@ constexpr float left_share_max = 1e-3f;
 // than that share of the hemisphere.
 constexpr float cell_share_min = 1e-3f, coverage_min = 1e-5f;
 // Choices take 8 bytes for each cell: a group of more emitters has patches of them.
-constexpr uint32_t single_max = 1024, patches_max = 128;
+constexpr uint32_t single_max = 1024, patches_max = 128;  // a power of two
 // Halves of a patch lie apart along its longest side, or their normals do: these are so long, of its diagonal.
 constexpr float normal_length = 0.6f;
 // Every emitter sends out some of its group's rays, up to so many in all.
@@ -143,34 +143,30 @@ void EmitterSampler::leaveFaintGroups() {
             groups[c.group].light += static_cast<double>(c.light);
             ++groups[c.group].cells;
         }
-    for (Cell& cell : cells_) {
+    for (Cell& cell : cells_)
         std::erase_if(cell, [&](const CellGroup& c) {
             const double mean = groups[c.group].light / groups[c.group].cells;
             return !c.wide && static_cast<double>(c.light) < static_cast<double>(cell_share_min) * mean;
         });
-    }
 }
 
+// One for each emitter of a group, or, where these are many, halves of halves.
 void EmitterSampler::makePatches() {
     for (uint32_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
         while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
-        const uint32_t parts = end - begin <= single_max ? end - begin : patches_max;
-        std::vector<uint32_t> ends = {begin, end};
-        // Halves of halves; `parts` is a power of two where there are fewer than emitters.
-        for (uint32_t count = 1; parts == patches_max && parts < end - begin && count < parts; count *= 2) {
-            std::vector<uint32_t> halves = {begin};
-            for (uint32_t i = 0; i < count; ++i) {
-                splitInHalves(std::span(emitters_).subspan(ends[i], ends[i + 1] - ends[i]));
-                halves.push_back(ends[i] + (ends[i + 1] - ends[i]) / 2);
-                halves.push_back(ends[i + 1]);
-            }
-            ends = std::move(halves);
-        }
-        if (parts == end - begin)
+        if (end - begin <= single_max)
             for (uint32_t i = begin; i < end; ++i) addPatch(i, i + 1);
         else
-            for (size_t i = 0; i + 1 < ends.size(); ++i) addPatch(ends[i], ends[i + 1]);
+            addHalves(begin, end, patches_max);
     }
+}
+
+void EmitterSampler::addHalves(uint32_t begin, uint32_t end, uint32_t patches) {
+    if (patches == 1) return addPatch(begin, end);
+    splitInHalves(std::span(emitters_).subspan(begin, end - begin));
+    const uint32_t middle = begin + (end - begin) / 2;
+    addHalves(begin, middle, patches / 2);
+    addHalves(middle, end, patches / 2);
 }
 
 void EmitterSampler::addPatch(uint32_t begin, uint32_t end) {

@@ -85,6 +85,7 @@ class EmitterSampler {
         bool double_sided = false;
     };
     void makePatches();
+    void addHalves(uint32_t begin, uint32_t end, uint32_t patches);
     void addPatch(uint32_t begin, uint32_t end);
     // `lit`: per group that has emitters, in order, the cells that it shines into.
     void fillCell(size_t index, std::span<const std::vector<uint8_t>> lit);

@@ -98,7 +98,7 @@ Expected<void> writeHeatMaps(const std::filesystem::path& folder, const Pack& pa
         if (auto ok = writeFileAtomically(file, *png); !ok) return ok;
     }
     const nlohmann::ordered_json index = {{"pack_id", pack_id}, {"state", state}, {"pages", pack.pageCount()}};
-    const std::string text = index.dump(2) + "\n";
+    const std::string text = index.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     return writeFileAtomically(folder / heat_map_index, std::as_bytes(std::span(text)));
 }
 

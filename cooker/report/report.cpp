@@ -231,9 +231,9 @@ class Report {
 
     // Of what `verify` measured.
     static std::string stateOf(const nlohmann::json& verified) {
-        const std::string state =
-            verified.contains("state") && verified["state"].is_string() ? verified["state"] : nlohmann::json("");
-        return state.empty() ? "All light sets on, doors closed" : "In the state " + escaped(state);
+        const bool named = verified.contains("state") && verified["state"].is_string() && verified["state"] != "";
+        return named ? "In the state " + escaped(verified["state"].get<std::string>())
+                     : "All light sets on, doors closed";
     }
 
     // Figures of `verify --json` and pictures of `verify --heatmap`.

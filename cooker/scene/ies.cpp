@@ -280,10 +280,6 @@ Place locate(const std::vector<float>& angles, float angle) {
     return {index, std::clamp((angle - low) / (high - low), 0.0f, 1.0f)};
 }
 
-}  // namespace
-
-namespace {
-
 constexpr std::array<float, 7> beam_shares = {0.5f, 0.2f, 0.1f, 0.05f, 0.02f, 0.01f, 0};
 constexpr float beam_cos_min = std::numbers::sqrt2_v<float> / 2;
 constexpr int beam_columns = 32;  // all around, beside the file's own

@@ -230,5 +230,21 @@ TEST_F(Cooks, WarnsOfWhatIsSuspicious) {
     }
 }
 
+// Both trace the level as it was mended: without a word a figure would seem to be of the file.
+TEST_F(Cooks, ReferenceAndVerifySayWhatWasMended) {
+    LevelFile level = plainLevel();
+    level.addNode(
+        {{"name", "flat"}, {"mesh", level.addMesh({{0, 0.5f, 0}, {1, 0.5f, 0}, {0, 1.5f, 0}}, {}, {0, 1, 2}, 0)}});
+    ASSERT_EQ(cookText(level.gltfText()).exit_code, 0);
+    const auto reference =
+        runDimmer({"reference", file("bad.gltf"), "--points", "-", "--paths", "2"}, "x,y,z,nx,ny,nz\n0,0,0,0,1,0\n");
+    EXPECT_EQ(reference.exit_code, 0) << reference.err;
+    EXPECT_THAT(reference.err, HasSubstr("warning: " + file("bad.gltf") + ": node 'flat': has no normals"));
+    const auto verified =
+        runDimmer({"verify", file("bad.gltf"), file("bad.dimmer"), "--points", "50", "--paths", "64"});
+    EXPECT_EQ(verified.exit_code, 0) << verified.err;
+    EXPECT_THAT(verified.err, HasSubstr("left out of the level, in 1 places"));
+}
+
 }  // namespace
 }  // namespace dimmer::test

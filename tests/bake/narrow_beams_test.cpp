@@ -112,7 +112,8 @@ struct Bell {
 };
 
 // Of beams a third of a texel across to three: eight points a texel found between a tenth and twice of it. A hundredth
-// of the peak all around is no beam, and is found by points: they tell a disk's edge to a tenth of a texel.
+// of the peak all around is no beam, and is found by points: they tell a disk's edge to a tenth of a texel. 1,024
+// directions integrate the narrowest, which falls by half within four of the file's steps, to 1.6 %.
 TEST(NarrowBeams, OfMeasuredLuminairesArrive) {
     for (const double faint : {0.0, 0.015})
         for (const double half_deg : {2.0, 5.0, 12.0})

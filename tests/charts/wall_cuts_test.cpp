@@ -1,6 +1,5 @@
 // Where walls cut what they stand on.
-#include <bake/test_scenes.h>
-#include <charts/texels.h>
+#include <charts/two_rooms.h>
 #include <charts/unwrap.h>
 #include <charts/wall_cuts.h>
 #include <gtest/gtest.h>
@@ -15,43 +14,6 @@
 
 namespace dimmer::cook::test {
 namespace {
-
-// A floor and a ceiling that run on, from one room of 4 x 3 m into another, under a wall of 0.2 m around x = 0 with a
-// doorway of 0.9 m: two stretches of wall of 1.05 m each, and 0.65 m of lintel between.
-constexpr float half_wall_m = 0.1f;
-Scene twoRooms() {
-    Scene scene;
-    const uint32_t white = addMaterial(scene, lambert(0.5f));
-    addSolid(scene, "floor", {0, -0.1f, 0}, {4, 0.1f, 1.5f}, white);
-    addSolid(scene, "ceiling", {0, 2.8f, 0}, {4, 0.1f, 1.5f}, white);
-    addSolid(scene, "wall", {0, 1.35f, -0.975f}, {half_wall_m, 1.35f, 0.525f}, white);
-    addSolid(scene, "wall", {0, 1.35f, 0.975f}, {half_wall_m, 1.35f, 0.525f}, white);
-    addSolid(scene, "lintel", {0, 2.375f, 0}, {half_wall_m, 0.325f, 0.45f}, white);
-    return scene;
-}
-
-// A texel of both rooms would carry light of the one into the other, and so would a page that filters between two.
-// `turned`: the scene, from where twoRooms() has it.
-void expectRoomsApart(const RayScene& rays, const Unwrap& charts, const glm::mat3& turned = glm::mat3(1)) {
-    const Texels texels = sampleTexels(rays, charts, 4);
-    struct Sides {
-        bool left = false, right = false;
-    };
-    std::vector<Sides> sides(charts.charts.size());
-    size_t points = 0;
-    for (size_t i = 0; i < texels.size(); ++i)
-        for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
-            const glm::vec3 p = glm::transpose(turned) * samplePoint(rays, charts, texels, i, s).position_m;
-            const uint32_t face = texels.sample(i, s).face;
-            const bool in_rooms = p.y > -0.05f && p.y < 2.75f && std::abs(p.x) > half_wall_m;
-            if (!in_rooms || std::abs(charts.frames[face].normal.y) < 0.9f) continue;
-            ++points;
-            Sides& of_chart = sides[charts.face_chart[face]];
-            (p.x < 0 ? of_chart.left : of_chart.right) = true;
-        }
-    EXPECT_GT(points, 40u);  // 48 m2, four points a texel
-    for (const Sides& s : sides) EXPECT_FALSE(s.left && s.right);
-}
 
 // At few texels per metre no stretch of wall between doorways is long: it is the whole wall that counts.
 TEST(WallCuts, RoomsWithADoorwayShareNoChartAtAnyDensity) {
@@ -126,26 +88,22 @@ TEST(WallCuts, WallsPartRoomsHoweverTheyStand) {
                 if (mesh.node == "wall") mesh.lighting = lighting;
         };
     };
+    const auto onFoot = [](float half_m) {
+        return [half_m](Scene& scene) {
+            for (SceneMesh& mesh : scene.meshes)
+                for (glm::vec3& p : mesh.positions_m)
+                    if (mesh.node == "wall") p.y = std::max(p.y, 0.1f);
+            addSolid(scene, "foot", {0, 0.05f, 0}, {half_m, 0.05f, 1.5f}, 0);
+        };
+    };
     const std::vector<std::pair<const char*, std::function<void(Scene&)>>> ways = {
         {"plumb", nothing},
         {"leans", moved([](glm::vec3 p) { return 0.02f * (p.y / 2.7f - 0.5f); })},
         {"askew", moved([](glm::vec3 p) { return 0.01f * p.z; })},
         {"is no receiver", lit(Lighting::None)},
         // Each let up to 72 % of the bright room's light past: no face of it is in one plane low and high.
-        {"has skirtings",
-         [](Scene& scene) {
-             for (SceneMesh& mesh : scene.meshes)
-                 if (mesh.node == "wall")
-                     for (glm::vec3& p : mesh.positions_m) p.y = std::max(p.y, 0.1f);
-             addSolid(scene, "wall", {0, 0.05f, 0}, {0.095f, 0.05f, 1.5f}, 0);
-         }},
-        {"stands on a strip",
-         [](Scene& scene) {
-             for (SceneMesh& mesh : scene.meshes)
-                 if (mesh.node == "wall")
-                     for (glm::vec3& p : mesh.positions_m) p.y = std::max(p.y, 0.1f);
-             addSolid(scene, "strip", {0, 0.05f, 0}, {0.02f, 0.05f, 1.5f}, 0);
-         }},
+        {"has skirtings", onFoot(0.095f)},
+        {"stands on a strip", onFoot(0.02f)},
         {"has a grid of its own", lit(Lighting::LocalGrid)},
     };
     for (const auto& [name, change] : ways) {
@@ -401,78 +359,6 @@ TEST(WallCuts, ALeafPartsTheJambsOfANarrowDoorway) {
         }
         EXPECT_GE(reach.size(), 4u);
         for (const auto& [chart, of] : reach) EXPECT_FALSE(of.first < -0.1f && of.second > 0.1f);
-    }
-}
-
-// UVs that are no unwrap are as good as none, and said to be none.
-TEST(WallCuts, MeshesWithUnusableUvsAreCutToo) {
-    Scene scene = twoRooms();
-    for (SceneMesh& mesh : scene.meshes) mesh.uv1 = {{0, 0}, {1, 0}, {1, 1}, {1, 0}};  // one triangle on the other
-    cutAtWalls(scene, 4);
-    const RayScene rays(scene);
-    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
-    ASSERT_TRUE(charts.has_value());
-    expectRoomsApart(rays, *charts);
-    ASSERT_EQ(charts->warnings.size(), scene.meshes.size());
-    for (uint32_t m = 0; m < scene.meshes.size(); ++m) {
-        EXPECT_EQ(charts->warnings[m].mesh, m);
-        EXPECT_EQ(charts->warnings[m].text, "TEXCOORD_1 is no lightmap unwrap (they overlap); charts were made");
-    }
-}
-
-// A level as the cooker writes it is cut already, but for a rounding step: it was said to let light past its walls.
-TEST(WallCuts, AnUnwrapThatIsPartedAtWallsIsNotWarnedOf) {
-    Scene scene = twoRooms();
-    const glm::mat3 turned(glm::rotate(glm::mat4(1), glm::radians(20.0f), {0, 1, 0}));
-    for (SceneMesh& mesh : scene.meshes) {
-        for (glm::vec3& p : mesh.positions_m) p = turned * p;
-        for (glm::vec3& n : mesh.normals) n = turned * n;
-    }
-    cutAtWalls(scene, 4);
-    size_t parted = 0;
-    for (SceneMesh& mesh : scene.meshes) {
-        if (mesh.triangle_regions.empty() || std::abs(mesh.normals[0].y) < 0.9f) continue;
-        ++parted;
-        mesh.uv1.resize(mesh.positions_m.size());
-        for (size_t t = 0; t < mesh.triangles.size(); ++t)
-            for (int i = 0; i < 3; ++i) {
-                const glm::vec3 p = mesh.positions_m[mesh.triangles[t][i]];
-                const float beside = mesh.triangle_regions[t] == mesh.triangle_regions[0] ? 0 : 0.5f;
-                mesh.uv1[mesh.triangles[t][i]] = {0.05f * (p.x + 5) * 0.9f + beside, 0.1f * (p.z + 5)};
-            }
-        mesh.triangle_regions.clear();
-    }
-    ASSERT_EQ(parted, 2u);
-    cutAtWalls(scene, 4);
-    for (const SceneMesh& mesh : scene.meshes) EXPECT_FALSE(mesh.uv1_crosses_walls) << mesh.node;
-}
-
-// What brings an unwrap of its own stays whole, and keeps nothing beside it whole.
-TEST(WallCuts, AnUnwrappedNeighbourIsLeftOut) {
-    Scene scene = twoRooms();
-    const size_t floor = 3;  // its upper side, which goes on in a strip of 8 x 1 m
-    addQuad(scene, "strip", {0, 0, 2}, {0, 0, 0.5f}, {4, 0, 0}, 0).uv1 = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    cutAtWalls(scene, 4);
-    EXPECT_GT(scene.meshes[floor].triangles.size(), 2u);
-    EXPECT_EQ(scene.meshes.back().triangles.size(), 2u);
-    EXPECT_EQ(scene.meshes.back().uv1.size(), 4u);
-    EXPECT_FALSE(scene.meshes.back().uv1_crosses_walls);
-}
-
-// What brings an unwrap stays whole, and where a wall stands on its triangles that is said.
-TEST(WallCuts, AnUnwrapUnderAWallIsSaid) {
-    for (const float z : {0.0f, 20.0f}) {
-        Scene scene = twoRooms();
-        addQuad(scene, "carpet", {0, 0.002f, z}, {0, 0, 1.4f}, {3, 0, 0}, 0).uv1 = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-        cutAtWalls(scene, 4);
-        EXPECT_EQ(scene.meshes.back().triangles.size(), 2u);
-        const RayScene rays(scene);
-        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
-        ASSERT_TRUE(charts.has_value());
-        ASSERT_EQ(charts->warnings.size(), z == 0 ? 1u : 0u);
-        if (z > 0) continue;
-        EXPECT_EQ(scene.meshes[charts->warnings[0].mesh].node, "carpet");
-        EXPECT_NE(charts->warnings[0].text.find("thin walls stand on it"), std::string::npos);
     }
 }
 

@@ -242,6 +242,19 @@ TEST(SceneModels, WhatFallsApartIntoSmallChartsGetsAGridUnlessTheLevelSaysOtherw
     for (size_t m = 1; m < scene.meshes.size(); ++m) EXPECT_EQ(scene.meshes[m].lighting, Lighting::Lightmap) << m;
 }
 
+// A ground in fine triangles had 50 probes for 900 m2, and no warning.
+TEST(SceneModels, GroundsAndVaultsAreNone) {
+    for (const float radius_m : {1.9f, 2.1f}) {
+        Scene scene;
+        addFloor(scene, 4, addMaterial(scene, lambert(0.5f)), -3).lighting = Lighting::Lightmap;
+        addSphere(scene, radius_m, 96, 48, 0);
+        scene.meshes[1].uv1.clear();
+        scene.meshes[1].lighting = Lighting::Automatic;
+        chooseLighting(scene);
+        EXPECT_EQ(scene.meshes[1].lighting, radius_m < 2 ? Lighting::LocalGrid : Lighting::Lightmap) << radius_m;
+    }
+}
+
 // A cave that is all curves was refused, for want of a lightmap.
 TEST(SceneModels, ALevelOfCurvesAloneHasLightmaps) {
     Scene scene;
