@@ -40,7 +40,7 @@ class Surface {
         const uint32_t other = neighbourInChart(unwrap_, texels_, receiver, dx, dy);
         if (other == no_index || other == receiver) return other;
         const uint32_t a = texels_.face(receiver), b = texels_.face(other);
-        if (a == b || !unwrap_.charts[unwrap_.face_chart[a]].of_file) return other;
+        if (a == b || !unwrap_.charts[unwrap_.face_chart[a]].curved) return other;
         if (!sameFrame(unwrap_.frames[a], unwrap_.frames[b])) return no_index;
         return nearInSpace(firstPoint(receiver), firstPoint(other), dx, dy) ? other : no_index;
     }

@@ -27,7 +27,7 @@ uint64_t keyOf(const Unwrap& unwrap, const Texels& texels, size_t texel) {
 
 bool joins(const Unwrap& unwrap, const Texels& texels, size_t texel) {
     const uint32_t face = texels.face(texel);
-    return unwrap.texel_area_m2[face] <= joined_texel_max_m2 && !unwrap.charts[unwrap.face_chart[face]].of_file;
+    return unwrap.texel_area_m2[face] <= joined_texel_max_m2 && !unwrap.charts[unwrap.face_chart[face]].curved;
 }
 
 // Something stands between two texels: a wall, a closed door, a chair's leg.

@@ -39,7 +39,7 @@ TexelPieces::TexelPieces(const Gatherer& gatherer, const GatherFrom& from) {
     // Of many faces, most of which have no point: known where the whole texel is of one plane.
     pieces_.clear(), area_m2_ = 0;
     const bool whole = area_m2 >= covered_min * unwrap.texel_area_m2[faces[0]];
-    if (!whole || unwrap.charts[unwrap.face_chart[faces[0]]].of_file) return;
+    if (!whole || unwrap.charts[unwrap.face_chart[faces[0]]].curved) return;
     const glm::vec2 corner(x, y);
     add(gatherer, faces[0], {corner, corner + glm::vec2(1, 0), corner + glm::vec2(1, 1), corner + glm::vec2(0, 1)});
 }

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace dimmer::cook {
 namespace {
@@ -17,6 +18,13 @@ constexpr int fill_rings = 1;
 // A neighbour's surface is looked for within this distance of the plane.
 constexpr float same_plane_m = 2e-3f;
 constexpr float same_direction = 0.999f;
+// Of a surface that curves: within so many texels of the plane that is continued from its edge.
+constexpr float bend_max = 0.25f;
+
+bool sameToTheEye(const TangentFrame& a, const TangentFrame& b) {
+    return glm::dot(a.normal, b.normal) >= same_direction && glm::dot(a.tangent, b.tangent) >= same_direction &&
+           glm::dot(a.bitangent, b.bitangent) >= same_direction;
+}
 
 class Padding {
    public:
@@ -77,22 +85,21 @@ class Padding {
         }
     }
 
-    // The receiver of another chart of the same plane that lies under the fill's centre; no_index when there is none.
+    // The receiver of another chart of the same surface that lies under the fill's centre; no_index when there is none.
     uint32_t acrossSeam(const FillTexel& fill, uint32_t chart) const {
         const SamplePoint own = samplePoint(rays_, unwrap_, texels_, fill.source, 0);
         const Face face = unwrap_.faces[own.face];
         const TangentFrame& frame = unwrap_.frames[own.face];
         const glm::vec3 centre =
             positionAt(own.face, glm::vec2(TexelAddress::x(fill.address) + 0.5f, TexelAddress::y(fill.address) + 0.5f));
-        const auto hit = rays_.nearest(centre + frame.normal * same_plane_m, -frame.normal, 2 * same_plane_m, 0);
+        const bool curved = unwrap_.charts[chart].curved;
+        const float off_plane_m = curved ? bend_max * std::sqrt(unwrap_.texel_area_m2[own.face]) : same_plane_m;
+        const auto hit = rays_.nearest(centre + frame.normal * off_plane_m, -frame.normal, 2 * off_plane_m, 0);
         if (!hit || hit->back != face.back) return no_index;
         const uint32_t other_face = unwrap_.faceOf(hit->triangle, hit->back);
         if (other_face == no_index || unwrap_.face_chart[other_face] == chart) return no_index;
         const TangentFrame& other = unwrap_.frames[other_face];
-        if (glm::dot(other.normal, frame.normal) < same_direction ||
-            glm::dot(other.tangent, frame.tangent) < same_direction ||
-            glm::dot(other.bitangent, frame.bitangent) < same_direction)
-            return no_index;
+        if (!(curved ? sameFrame(other, frame) : sameToTheEye(other, frame))) return no_index;
         const uint32_t found = receiverOf(unwrap_, texels_, *hit);
         if (found == no_index || found == fill.source) return no_index;
         const glm::vec3 from = own.position_m, to = samplePoint(rays_, unwrap_, texels_, found, 0).position_m;

@@ -1,6 +1,7 @@
 #include <charts/planar.h>
 
 #include <charts/box_tree.h>
+#include <charts/face_walls.h>
 #include <charts/groups.h>
 #include <charts/polygon.h>
 #include <charts/raster.h>
@@ -21,41 +22,11 @@ namespace {
 
 // Planes and lines are told apart at these steps: finer than any texel, coarser than 32-bit coordinates at 100 m.
 constexpr float normal_steps = 512, offset_steps_per_m = 128, direction_steps = 2048;
-constexpr float touching_m = 1e-3f;
 // Of the directions of edges, in a quarter of a turn.
 constexpr int edge_directions = 360;
-// Bilinear filtering and padding reach this far.
-constexpr float filter_reach_texels = 2;
 // A merged rectangle may waste this much of the page, relative to the two rectangles it replaces.
 constexpr float waste_max = 1.3f;
 constexpr float waste_free_texels = 16;
-// Within one plane, as planeKey() tells them apart, and the normals of its faces: by how much heights over it differ.
-constexpr float height_slack_m = 0.02f, height_slack_per_m = 1.0f / 256;
-// From the edge of a face towards its middle, where lines to other faces begin.
-constexpr float step_in = 0.01f;
-// Rays are as exact as coordinates: 8e-6 m at 100 m.
-constexpr float ray_slack_m = 1e-4f, ray_slack_per_m = 1e-6f;
-// With more than so many things around a face each line between points is asked for.
-constexpr size_t shadows_max = 512;
-// A surface this high over another one hides it: the points that texels are lit at lie lower (texels.cpp).
-constexpr float hiding_m = 5e-4f;
-
-struct Axes {
-    glm::vec3 u, v;
-    explicit Axes(glm::vec3 n) {
-        const glm::vec3 reference = std::abs(n.y) > 0.9f ? glm::vec3(0, 0, -1) : glm::vec3(0, 1, 0);
-        u = glm::normalize(glm::cross(reference, n));
-        v = glm::cross(n, u);
-    }
-    // With `along` of these axes as the first one.
-    Axes turned(glm::vec2 along) const {
-        Axes axes = *this;
-        axes.u = glm::normalize(along.x * u + along.y * v);
-        axes.v = glm::normalize(along.x * v - along.y * u);
-        return axes;
-    }
-    glm::vec2 on(glm::vec3 p) const { return {glm::dot(p, u), glm::dot(p, v)}; }
-};
 
 using PlaneKey = std::tuple<uint32_t, uint32_t, long, long, long, long, long>;
 
@@ -103,19 +74,20 @@ class PlaneGrouper {
         findContacts();
     }
 
-    std::vector<PlanarChart> charts(const Standing& standing) {
+    std::vector<ProjectedChart> charts(const Standing& standing) {
         Apart apart = findStacks();
         merge(apart);
         if (standing.blocked && findWalls(standing, apart)) merge(apart);
-        std::map<uint32_t, PlanarChart> by_root;
+        std::map<uint32_t, ProjectedChart> by_root;
         for (uint32_t i = 0; i < ids_.size(); ++i) {
             const uint32_t root = groups_.find(i);
             auto [it, fresh] = by_root.try_emplace(root);
             if (fresh)
-                it->second = {axes_.u, axes_.v, rects_[root].min, rects_[root].max - rects_[root].min, density_, {}};
+                it->second = {axes_.u, axes_.v, rects_[root].min, rects_[root].max - rects_[root].min, density_,
+                              {},      false};
             it->second.faces.push_back(ids_[i]);
         }
-        std::vector<PlanarChart> out;
+        std::vector<ProjectedChart> out;
         for (auto& [root, chart] : by_root) out.push_back(std::move(chart));
         return out;
     }
@@ -271,78 +243,25 @@ class PlaneGrouper {
     // Adds the pairs of faces of one chart that come within the filter's reach of one another with a wall between.
     bool findWalls(const Standing& standing, Apart& apart) {
         const size_t before = apart.size();
-        const float reach = filter_reach_texels / density_;
-        std::vector<uint32_t> root(ids_.size());
-        for (uint32_t i = 0; i < ids_.size(); ++i) root[i] = groups_.find(i);
-        std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
         if (ids_.size() < 2) return false;
-        glm::vec2 largest_m(0);
-        for (uint32_t i = 0; i < ids_.size(); ++i) largest_m = glm::max(largest_m, rectOf(i).max - rectOf(i).min);
-        // Lines begin so far from where faces end.
-        const float look_m = reach + step_in * std::max(largest_m.x, largest_m.y);
+        FaceWalls::Reach reach{filter_reach_texels / density_, 0, 0, 0};
+        std::vector<uint32_t> root(ids_.size());
+        for (uint32_t i = 0; i < ids_.size(); ++i) {
+            root[i] = groups_.find(i);
+            const glm::vec2 size_m = rectOf(i).max - rectOf(i).min;
+            reach.largest_m = std::max({reach.largest_m, size_m.x, size_m.y});
+        }
+        std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
         tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
-            const Walls walls{standing.blocked, standing.triangles ? shadowsNear(a, look_m, standing) : std::nullopt};
-            if (walls.shadows && walls.shadows->empty()) return;
-            for (const uint32_t b : boxes_.touching(boxOf(a, reach + touching_m)))
-                if (a < b && root[a] == root[b] && near(a, b, reach) && walls.mayPart(rectOf(a), rectOf(b)) &&
-                    (wallBetween(a, b, reach, walls) || wallBetween(b, a, reach, walls)))
+            const FaceWalls walls(all_[ids_[a]], axes_, reach, standing);
+            if (walls.none()) return;
+            for (const uint32_t b : boxes_.touching(boxOf(a, reach.near_m + touching_m)))
+                if (a < b && root[a] == root[b] && near(a, b, reach.near_m) && walls.partFrom(all_[ids_[b]]))
                     beyond_walls[a].push_back(b);
         });
         for (uint32_t a = 0; a < ids_.size(); ++a)
             for (const uint32_t b : beyond_walls[a]) keepApart(apart, a, b);
         return apart.size() > before;
-    }
-
-    // What may part faces from one: of all that stands as high as a wall, where it is in the plane; nothing: anywhere.
-    struct Walls {
-        const std::function<bool(glm::vec3, glm::vec3)>& blocked;
-        std::optional<std::vector<Rect>> shadows;
-
-        bool mayPart(Rect a, const Rect& b) const {
-            a.add(b);
-            return !shadows || std::ranges::any_of(*shadows, [&](const Rect& shadow) { return shadow.touches(a); });
-        }
-    };
-
-    // Within reach of a face; nothing where there are too many.
-    std::optional<std::vector<Rect>> shadowsNear(uint32_t face, float reach, const Standing& standing) const {
-        const PlanarFace& f = all_[ids_[face]];
-        Rect rect = rectOf(face);
-        const float slack_m = height_slack_m + height_slack_per_m * (reach + glm::length(rect.max - rect.min));
-        rect.min -= reach, rect.max += reach;
-        const glm::vec3 normal = glm::cross(axes_.u, axes_.v);
-        const float plane_m = glm::dot(normal, f.corners_m[0]);
-        const float low = plane_m + wall_probe_high_m - slack_m, high = plane_m + wall_probe_high_m + slack_m;
-        std::vector<glm::vec3> corners;
-        for (const float height : {low, high})
-            for (const float u : {rect.min.x, rect.max.x})
-                for (const float v : {rect.min.y, rect.max.y})
-                    corners.push_back(axes_.u * u + axes_.v * v + normal * height);
-        std::vector<Rect> shadows;
-        for (const auto& triangle : standing.triangles(BoxTree::boxOf(corners))) {
-            Rect shadow = shadowBetween(triangle, normal, low, high);
-            if (!(shadow.min.x <= shadow.max.x)) continue;
-            const glm::vec2 largest = glm::max(glm::abs(shadow.min), glm::abs(shadow.max));
-            const float ray_slack = ray_slack_m + ray_slack_per_m * std::max(largest.x, largest.y);
-            shadow.min -= ray_slack, shadow.max += ray_slack;
-            if (shadow.touches(rect)) shadows.push_back(shadow);
-            if (shadows.size() > shadows_max) return std::nullopt;
-        }
-        return shadows;
-    }
-
-    // Where in the plane a triangle is between two heights.
-    Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, glm::vec3 normal, float low, float high) const {
-        Rect shadow;
-        for (size_t i = 0; i < 3; ++i) {
-            const glm::vec3 a = triangle[i], b = triangle[(i + 1) % 3];
-            const float height_a = glm::dot(normal, a), height_b = glm::dot(normal, b);
-            if (height_a >= low && height_a <= high) shadow.add(axes_.on(a));
-            for (const float height : {low, high})
-                if ((height_a < height) != (height_b < height))
-                    shadow.add(axes_.on(glm::mix(a, b, (height - height_a) / (height_b - height_a))));
-        }
-        return shadow;
     }
 
     // In the plane, and so much more to each side.
@@ -362,44 +281,6 @@ class PlaneGrouper {
         return glm::all(glm::lessThan(ra.min, rb.max + reach)) && glm::all(glm::lessThan(rb.min, ra.max + reach));
     }
 
-    bool wallBetween(uint32_t a, uint32_t b, float reach, const Walls& walls) const {
-        const PlanarFace& fa = all_[ids_[a]];
-        const PlanarFace& fb = all_[ids_[b]];
-        auto wallAt = [&](glm::vec3 p, glm::vec3 q, float height_m) {
-            const glm::vec3 lift = fa.normal * height_m;
-            return walls.blocked(p + lift, q + lift) || walls.blocked(q + lift, p + lift);
-        };
-        const glm::vec3 middle = (fa.corners_m[0] + fa.corners_m[1] + fa.corners_m[2]) / 3.0f;
-        for (size_t e = 0; e < 3; ++e)
-            for (float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
-                glm::vec3 p = glm::mix(fa.corners_m[e], fa.corners_m[(e + 1) % 3], s);
-                glm::vec3 q = nearestOn(fb, p);
-                const float distance = glm::length(q - p);
-                if (distance < touching_m || distance > reach) continue;
-                // Step off the edges, on which the wall itself may stand.
-                const glm::vec3 middle_b = (fb.corners_m[0] + fb.corners_m[1] + fb.corners_m[2]) / 3.0f;
-                p += step_in * (middle - p);
-                q += step_in * (middle_b - q);
-                const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
-                if (!walls.mayPart({on_p, on_p}, {on_q, on_q})) continue;
-                if (wallAt(p, q, wall_probe_low_m) && wallAt(p, q, wall_probe_high_m)) return true;
-            }
-        return false;
-    }
-
-    static glm::vec3 nearestOn(const PlanarFace& f, glm::vec3 p) {
-        glm::vec3 best = f.corners_m[0];
-        float best2 = 1e30f;
-        for (size_t e = 0; e < 3; ++e) {
-            const glm::vec3 a = f.corners_m[e], ab = f.corners_m[(e + 1) % 3] - a;
-            const float s = std::clamp(glm::dot(p - a, ab) / glm::dot(ab, ab), 0.0f, 1.0f);
-            const glm::vec3 q = a + s * ab;
-            const float d2 = glm::dot(q - p, q - p);
-            if (d2 < best2) best2 = d2, best = q;
-        }
-        return best;
-    }
-
     std::span<const PlanarFace> all_;
     std::vector<uint32_t> ids_;
     Axes axes_;
@@ -413,11 +294,11 @@ class PlaneGrouper {
 
 }  // namespace
 
-std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const Standing& standing) {
+std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
+                                         const Standing& standing) {
     std::map<PlaneKey, std::vector<uint32_t>> planes;
     for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
-    std::vector<PlanarChart> charts;
+    std::vector<ProjectedChart> charts;
     const auto chart = [&](PlaneGrouper& plane) {
         std::ranges::move(plane.charts(standing), std::back_inserter(charts));
     };
@@ -441,7 +322,7 @@ std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_
         chart(rest);
     }
     // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
-    std::ranges::sort(charts, {}, [](const PlanarChart& c) { return c.faces[0]; });
+    std::ranges::sort(charts, {}, [](const ProjectedChart& c) { return c.faces[0]; });
     return charts;
 }
 

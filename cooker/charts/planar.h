@@ -20,15 +20,17 @@ struct PlanarFace {
     std::array<glm::vec3, 3> corners_m;  // counter-clockwise seen from the lit side
     glm::vec3 normal;
     float texels_per_metre;
-    uint32_t group;       // faces of different groups never share a chart
-    uint32_t region = 0;  // nor do faces of different regions
+    uint32_t group;                             // faces of different groups never share a chart
+    uint32_t region = 0;                        // nor do faces of different regions
+    std::array<glm::vec3, 3> corner_normals{};  // that it is shaded with; where two faces agree, one surface curves
 };
 
-struct PlanarChart {
+struct ProjectedChart {
     glm::vec3 u_axis, v_axis;  // unit; u x v = normal
     glm::vec2 min_m, size_m;   // of the chart's rectangle, along the axes
     float texels_per_metre;
     std::vector<uint32_t> faces;  // indices into the input, ascending
+    bool curved = false;          // seen along u x v, which is the mean normal then (curved.h)
 };
 
 // Doors move, so their leaves share no chart with the level, nor closed ones with open ones.
@@ -47,7 +49,7 @@ struct Standing {
 
 // Deterministic. Cost: near O(n log n) where the boxes of faces in one plane overlap few others; where something stands
 // on them, times those within two texels of it.
-std::vector<PlanarChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
-                                      const Standing& standing = {});
+std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
+                                         const Standing& standing = {});
 
 }  // namespace dimmer::cook

@@ -57,7 +57,7 @@ std::vector<WallLine> joined(std::vector<WallLine> lines) {
     return joined;
 }
 
-glm::vec2 flat(const PlanarChart& chart, glm::vec3 p) {
+glm::vec2 flat(const ProjectedChart& chart, glm::vec3 p) {
     return {glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)};
 }
 
@@ -83,7 +83,7 @@ StandingWalls::StandingWalls(std::span<const PlanarFace> faces, Blocking blockin
     all_boxes_ = BoxTree(std::move(boxes));
 }
 
-WallLines StandingWalls::on(const PlanarChart& chart, float coarsest_texels_per_metre) const {
+WallLines StandingWalls::on(const ProjectedChart& chart, float coarsest_texels_per_metre) const {
     const float reach_m = reach_texels / coarsest_texels_per_metre;
     WallLines found{turnsOf(chart), {}};
     for (uint32_t t = 0; t < found.turns.size(); ++t)
@@ -95,7 +95,7 @@ WallLines StandingWalls::on(const PlanarChart& chart, float coarsest_texels_per_
 }
 
 // Its own axes, and those along which something stands on it otherwise, the longest first.
-std::vector<Turn> StandingWalls::turnsOf(const PlanarChart& chart) const {
+std::vector<Turn> StandingWalls::turnsOf(const ProjectedChart& chart) const {
     std::vector<Segment> segments = segmentsAt(chart, wall_probe_low_m, Which::All);
     const std::vector<Segment> leaves = segmentsAt(chart, leaf_probe_low_m, Which::Leaves);
     segments.insert(segments.end(), leaves.begin(), leaves.end());
@@ -119,8 +119,8 @@ std::vector<Turn> StandingWalls::turnsOf(const PlanarChart& chart) const {
     return turns;
 }
 
-PlanarChart StandingWalls::turned(const PlanarChart& chart, Turn turn) const {
-    PlanarChart other = chart;
+ProjectedChart StandingWalls::turned(const ProjectedChart& chart, Turn turn) const {
+    ProjectedChart other = chart;
     other.u_axis = turn.cos * chart.u_axis + turn.sin * chart.v_axis;
     other.v_axis = turn.cos * chart.v_axis - turn.sin * chart.u_axis;
     glm::vec2 low(std::numeric_limits<float>::max()), high(std::numeric_limits<float>::lowest());
@@ -137,7 +137,7 @@ auto StandingWalls::placeOf(const Trace& trace) {
     return std::tuple(trace.axis, trace.forward, trace.at);
 }
 
-std::vector<WallLine> StandingWalls::alongAxes(const PlanarChart& chart, float reach_m) const {
+std::vector<WallLine> StandingWalls::alongAxes(const ProjectedChart& chart, float reach_m) const {
     std::vector<Trace> low = lowTraces(chart), high = joinedTraces(findTraces(chart, highProbe(chart), Which::All));
     std::ranges::sort(low, {}, placeOf);
     std::ranges::sort(high, {}, placeOf);
@@ -220,7 +220,7 @@ std::vector<StandingWalls::Solid> StandingWalls::longOnes(std::vector<Solid> sol
 
 // A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
 // other, and is no higher over either. So below what faces nearly all of the chart, where that is near.
-float StandingWalls::highProbe(const PlanarChart& chart) const {
+float StandingWalls::highProbe(const ProjectedChart& chart) const {
     const PlanarFace& any = faces_[chart.faces[0]];
     if (any.group != 0) return wall_probe_high_m;  // of a door's leaf
     const float plane = glm::dot(any.normal, any.corners_m[0]);
@@ -279,7 +279,7 @@ std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trac
 }
 
 // A place at a height over a chart. The normal of one of its faces may differ from the chart's own by a rounding step.
-glm::vec3 StandingWalls::onPlane(const PlanarChart& chart, glm::vec2 at, float height_m) const {
+glm::vec3 StandingWalls::onPlane(const ProjectedChart& chart, glm::vec2 at, float height_m) const {
     const PlanarFace& any = faces_[chart.faces[0]];
     const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis);
@@ -288,7 +288,7 @@ glm::vec3 StandingWalls::onPlane(const PlanarChart& chart, glm::vec2 at, float h
 }
 
 // What holds every trace that counts at a height over a chart's rectangle.
-BoxTree::Box StandingWalls::boxOver(const PlanarChart& chart, float height_m) const {
+BoxTree::Box StandingWalls::boxOver(const ProjectedChart& chart, float height_m) const {
     std::array<glm::vec3, 4> corners;
     for (uint32_t i = 0; i < 4; ++i)
         corners[i] = onPlane(chart, chart.min_m + chart.size_m * glm::vec2(i & 1, i >> 1), height_m);
@@ -305,7 +305,7 @@ float StandingWalls::Segment::slackM(float texels_per_metre) const {
                     std::min({skew_share * glm::length(b - a), skew_texels / texels_per_metre, skew_max_m}));
 }
 
-std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const PlanarChart& chart, float height_m,
+std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const ProjectedChart& chart, float height_m,
                                                               Which which) const {
     const PlanarFace& any = faces_[chart.faces[0]];
     const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
@@ -329,7 +329,7 @@ std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const PlanarChart&
     return segments;
 }
 
-std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& chart, float height_m,
+std::vector<StandingWalls::Trace> StandingWalls::findTraces(const ProjectedChart& chart, float height_m,
                                                             Which which) const {
     const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
     std::vector<Trace> traces;
@@ -358,7 +358,7 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const PlanarChart& c
 }
 
 // Of leaves over what does not move a little higher up.
-std::vector<StandingWalls::Trace> StandingWalls::lowTraces(const PlanarChart& chart) const {
+std::vector<StandingWalls::Trace> StandingWalls::lowTraces(const ProjectedChart& chart) const {
     if (faces_[chart.faces[0]].group != 0) return joinedTraces(findTraces(chart, wall_probe_low_m, Which::All));
     std::vector<Trace> traces = findTraces(chart, wall_probe_low_m, Which::Fixed);
     const std::vector<Trace> leaves = findTraces(chart, leaf_probe_low_m, Which::Leaves);
@@ -389,7 +389,7 @@ std::vector<StandingWalls::Trace> StandingWalls::joinedTraces(std::vector<Trace>
 // A face of no solid: the chart goes on behind it, with room, and backs are seen there neither close behind, nor along
 // the face or straight up. (They are within solids, and within what lacks the sides that touch others: cupboards,
 // steps.)
-bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
+bool StandingWalls::isSkin(const ProjectedChart& chart, const Trace& trace) const {
     if (trace.double_sided) return false;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
                     behind = (trace.forward ? -1.0f : 1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
@@ -410,7 +410,7 @@ bool StandingWalls::isSkin(const PlanarChart& chart, const Trace& trace) const {
     return false;
 }
 
-bool StandingWalls::covers(const PlanarChart& chart, glm::vec3 p) const {
+bool StandingWalls::covers(const ProjectedChart& chart, glm::vec3 p) const {
     const glm::vec2 at = flat(chart, p);
     return std::ranges::any_of(all_boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t face) {
         if (!std::ranges::binary_search(chart.faces, face)) return false;

@@ -57,7 +57,7 @@ class StandingWalls {
     // outline there, as over a skirting. Cost: that of the faces
     // at the two heights over the chart for each pair of directions at right angles that they have, and of some rays
     // behind each single-sided wall.
-    WallLines on(const PlanarChart& chart, float coarsest_texels_per_metre) const;
+    WallLines on(const ProjectedChart& chart, float coarsest_texels_per_metre) const;
 
    private:
     // The trace of blocking triangles in one plane at a height over a chart.
@@ -94,17 +94,17 @@ class StandingWalls {
     static std::vector<Solid> solidsBelow(std::span<const Solid> high, std::span<const Solid> low, float reach_m);
     static std::vector<Solid> longOnes(std::vector<Solid> solids);
     static std::vector<Trace> joinedTraces(std::vector<Trace> traces);
-    std::vector<WallLine> alongAxes(const PlanarChart& chart, float reach_m) const;
-    std::vector<Turn> turnsOf(const PlanarChart& chart) const;
-    PlanarChart turned(const PlanarChart& chart, Turn turn) const;
-    std::vector<Segment> segmentsAt(const PlanarChart& chart, float height_m, Which which) const;
-    std::vector<Trace> findTraces(const PlanarChart& chart, float height_m, Which which) const;
-    std::vector<Trace> lowTraces(const PlanarChart& chart) const;
-    float highProbe(const PlanarChart& chart) const;
-    glm::vec3 onPlane(const PlanarChart& chart, glm::vec2 at, float height_m) const;
-    BoxTree::Box boxOver(const PlanarChart& chart, float height_m) const;
-    bool isSkin(const PlanarChart& chart, const Trace& trace) const;
-    bool covers(const PlanarChart& chart, glm::vec3 p) const;
+    std::vector<WallLine> alongAxes(const ProjectedChart& chart, float reach_m) const;
+    std::vector<Turn> turnsOf(const ProjectedChart& chart) const;
+    ProjectedChart turned(const ProjectedChart& chart, Turn turn) const;
+    std::vector<Segment> segmentsAt(const ProjectedChart& chart, float height_m, Which which) const;
+    std::vector<Trace> findTraces(const ProjectedChart& chart, float height_m, Which which) const;
+    std::vector<Trace> lowTraces(const ProjectedChart& chart) const;
+    float highProbe(const ProjectedChart& chart) const;
+    glm::vec3 onPlane(const ProjectedChart& chart, glm::vec2 at, float height_m) const;
+    BoxTree::Box boxOver(const ProjectedChart& chart, float height_m) const;
+    bool isSkin(const ProjectedChart& chart, const Trace& trace) const;
+    bool covers(const ProjectedChart& chart, glm::vec3 p) const;
     struct Met {
         float at_m;  // the largest number: nothing
         bool is_back;

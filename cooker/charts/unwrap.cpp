@@ -1,5 +1,6 @@
 #include <charts/unwrap.h>
 
+#include <charts/curved.h>
 #include <charts/file_uv.h>
 #include <charts/planar.h>
 #include <charts/raster.h>
@@ -20,7 +21,7 @@ struct Placed {
     uint32_t width = 0, height = 0;
     std::vector<uint32_t> faces;
     std::vector<std::array<glm::vec2, 3>> uv_texels;
-    bool of_file = false;
+    bool curved = false;
 };
 
 std::array<glm::vec3, 3> corners(const RayScene& rays, Face face) {
@@ -28,6 +29,14 @@ std::array<glm::vec3, 3> corners(const RayScene& rays, Face face) {
                                   rays.corner(face.triangle, 2)};
     if (face.back) std::swap(c[1], c[2]);
     return c;
+}
+
+std::array<glm::vec3, 3> cornerNormals(const SceneMesh& mesh, uint32_t triangle, bool back) {
+    std::array<glm::vec3, 3> n;
+    for (int i = 0; i < 3; ++i)
+        n[static_cast<size_t>(i)] = (back ? -1.0f : 1.0f) * mesh.normals[mesh.triangles[triangle][i]];
+    if (back) std::swap(n[1], n[2]);
+    return n;
 }
 
 std::vector<Face> listFaces(const RayScene& rays) {
@@ -121,9 +130,9 @@ std::vector<Placed> fileCharts(const RayScene& rays, Unwrap& out, const std::vec
     return charts;
 }
 
-// A planar chart, its grid fitted so that the rectangle's edges fall on texel edges.
-Placed planarChart(const RayScene& rays, const std::vector<Face>& faces, const std::vector<uint32_t>& face_ids,
-                   PlanarChart chart, uint32_t side_max) {
+// A chart seen along one direction, its grid fitted so that the rectangle's edges fall on texel edges.
+Placed projectedChart(const RayScene& rays, const std::vector<Face>& faces, const std::vector<uint32_t>& face_ids,
+                      ProjectedChart chart, uint32_t side_max) {
     const float usable = static_cast<float>(side_max - 2 * padding_texels);
     const float largest = std::max(chart.size_m.x, chart.size_m.y);
     const float density = std::min(chart.texels_per_metre, usable / largest);
@@ -132,7 +141,8 @@ Placed planarChart(const RayScene& rays, const std::vector<Face>& faces, const s
     Placed placed{static_cast<uint32_t>(texels.x) + 2 * padding_texels,
                   static_cast<uint32_t>(texels.y) + 2 * padding_texels,
                   {},
-                  {}};
+                  {},
+                  chart.curved};
     for (uint32_t local : chart.faces) {
         const uint32_t id = face_ids[local];
         std::array<glm::vec2, 3> uv;
@@ -248,10 +258,11 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
             continue;
         }
         const glm::vec3 normal = rays.triangles()[face.triangle].normal;
-        planar.push_back(
-            {corners(rays, face), face.back ? -normal : normal,
-             mesh.texels_per_metre.value_or(options.texels_per_metre), chartGroup(mesh),
-             mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[rays.triangles()[face.triangle].triangle]});
+        const uint32_t own = rays.triangles()[face.triangle].triangle;
+        planar.push_back({corners(rays, face), face.back ? -normal : normal,
+                          mesh.texels_per_metre.value_or(options.texels_per_metre), chartGroup(mesh),
+                          mesh.triangle_regions.empty() ? 0 : mesh.triangle_regions[own],
+                          cornerNormals(mesh, own, face.back)});
         planar_ids.push_back(id);
     }
     for (const auto& [m, ids] : file_faces)
@@ -267,10 +278,11 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
         for (const uint32_t t : triangles.touching(box)) found.push_back(corners(rays, {t, false}));
         return found;
     };
-    for (PlanarChart& c : planarCharts(planar, options.page_size - 2 * padding_texels, standing)) {
+    const uint32_t side_max = options.page_size - 2 * padding_texels;
+    for (ProjectedChart& c : joinCurved(planar, planarCharts(planar, side_max, standing), side_max, standing)) {
         warnOfCoarseness(rays, out, planar_ids[c.faces[0]], std::max(c.size_m.x, c.size_m.y) * c.texels_per_metre,
                          options.page_size);
-        charts.push_back(planarChart(rays, out.faces, planar_ids, std::move(c), options.page_size));
+        charts.push_back(projectedChart(rays, out.faces, planar_ids, std::move(c), options.page_size));
     }
     return charts;
 }
@@ -345,7 +357,7 @@ Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
     out.frames.resize(count);
     out.texel_area_m2.resize(count);
     for (uint32_t c = 0; c < charts.size(); ++c) {
-        out.charts[c].of_file = charts[c].of_file;
+        out.charts[c].curved = charts[c].curved;
         for (size_t i = 0; i < charts[c].faces.size(); ++i) {
             const uint32_t id = charts[c].faces[i];
             const Face face = out.faces[id];

@@ -23,7 +23,7 @@ struct Face {
 // A rectangle of texels on a page; its outermost ring is padding for bilinear filtering.
 struct Chart {
     uint32_t page = 0, x = 0, y = 0, width = 0, height = 0;
-    bool of_file = false;  // a mesh's own unwrap: islands side by side, curved ones too; else it is of one plane
+    bool curved = false;  // a surface that curves, or islands of a mesh's own unwrap; else it is of one plane
 };
 
 // A right- or left-handed tangent frame: `tangent` is the direction of increasing u, `bitangent` that of increasing v,
@@ -68,8 +68,8 @@ struct UnwrapOptions {
 };
 
 // SceneMesh::uv1 is used where there is one, and must be an unwrap: cutAtWalls() sees to that. Everything else gets
-// planar charts: coplanar faces that share an edge, as long as no wall stands between parts that come close to one
-// another (filtering would leak through it).
+// charts seen along their normal: faces that share an edge, coplanar or of a surface that curves gently, as long as no
+// wall stands between parts that come close to one another (filtering would leak through it).
 Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options);
 
 // Texels of the pages that charts of these sizes fill, as unwrap() packs them; UINT64_MAX: of too many pages.

@@ -35,7 +35,7 @@ class WallCutter {
     }
 
     void run() {
-        const std::vector<PlanarChart> charts = chartsOf(0, cuttable_);
+        const std::vector<ProjectedChart> charts = chartsOf(0, cuttable_);
         const std::vector<Parts> parts = partsOf(charts);
         uint32_t region = 0;
         std::map<uint32_t, Replacements> by_mesh;
@@ -55,15 +55,15 @@ class WallCutter {
    private:
     using Parts = std::vector<std::vector<Piece>>;  // of a chart, what its walls leave beside one another
 
-    std::vector<PlanarChart> chartsOf(size_t first, size_t end) const {
+    std::vector<ProjectedChart> chartsOf(size_t first, size_t end) const {
         constexpr uint32_t no_side_limit = 1u << 20;
         auto charts = planarCharts(std::span(faces_).subspan(first, end - first), no_side_limit);
-        for (PlanarChart& chart : charts)
+        for (ProjectedChart& chart : charts)
             for (uint32_t& face : chart.faces) face += static_cast<uint32_t>(first);
         return charts;
     }
 
-    std::vector<Parts> partsOf(const std::vector<PlanarChart>& charts) const {
+    std::vector<Parts> partsOf(const std::vector<ProjectedChart>& charts) const {
         std::vector<Parts> parts(charts.size());
         tbb::parallel_for(size_t{0}, charts.size(), [&](size_t c) { parts[c] = partsOf(charts[c]); });
         return parts;
@@ -86,7 +86,7 @@ class WallCutter {
     struct Replacement {
         Piece piece;
         uint32_t region;
-        const PlanarChart* chart;
+        const ProjectedChart* chart;
     };
     using Replacements = std::map<uint32_t, std::vector<Replacement>>;
 
@@ -118,7 +118,7 @@ class WallCutter {
     }
 
     // Texels per metre of its largest face, which has to fit a page.
-    float coarsestOf(const PlanarChart& chart) const {
+    float coarsestOf(const ProjectedChart& chart) const {
         float largest_m = 0;
         for (const uint32_t face : chart.faces) {
             Rect rect;
@@ -130,7 +130,7 @@ class WallCutter {
         return std::min(chart.texels_per_metre, side_max_texels_ / largest_m);
     }
 
-    Parts partsOf(const PlanarChart& chart) const {
+    Parts partsOf(const ProjectedChart& chart) const {
         const WallLines walls = walls_.on(chart, coarsestOf(chart));
         if (walls.lines.empty()) return {};
         std::vector<Piece> all;
@@ -174,7 +174,7 @@ class WallCutter {
         mesh.triangle_regions = std::move(regions);
     }
 
-    static uint32_t addVertex(SceneMesh& mesh, glm::uvec3 index, const PlanarChart& chart, glm::vec2 p) {
+    static uint32_t addVertex(SceneMesh& mesh, glm::uvec3 index, const ProjectedChart& chart, glm::vec2 p) {
         std::array<glm::vec2, 3> flat;
         for (int i = 0; i < 3; ++i) {
             const glm::vec3 corner = mesh.positions_m[index[i]];

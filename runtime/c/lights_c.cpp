@@ -85,15 +85,17 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
                                           const dimmer_vulkan_options* options, dimmer_lights** lights) {
     if (!given(pack, vulkan, lights)) return DIMMER_INVALID_ARGUMENT;
     return guarded([&] {
-        const VulkanContext context{.instance = vulkan->instance,
-                                    .physical_device = vulkan->physical_device,
-                                    .device = vulkan->device,
-                                    .queue = vulkan->queue,
-                                    .queue_family = vulkan->queue_family,
-                                    .compute_queue = vulkan->compute_queue,
-                                    .compute_queue_family = vulkan->compute_queue_family,
-                                    .get_instance_proc_addr = vulkan->get_instance_proc_addr,
-                                    .pipeline_cache = vulkan->pipeline_cache};
+        const VulkanContext context{
+            .instance = vulkan->instance,
+            .physical_device = vulkan->physical_device,
+            .device = vulkan->device,
+            .queue = vulkan->queue,
+            .queue_family = vulkan->queue_family,
+            .compute_queue = vulkan->compute_queue,
+            .compute_queue_family = vulkan->compute_queue_family,
+            .get_instance_proc_addr = vulkan->get_instance_proc_addr,
+            .pipeline_cache = vulkan->pipeline_cache,
+            .queue_lock = {.lock = vulkan->lock_queue, .unlock = vulkan->unlock_queue, .user = vulkan->lock_user}};
         const dimmer_vulkan_options asked = options ? *options : dimmer_vulkan_options{};
         if (asked.buffering != DIMMER_IN_PLACE && asked.buffering != DIMMER_DOUBLE_BUFFERED)
             return report({ErrorCode::InvalidArgument,
@@ -106,7 +108,8 @@ dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_
              .frames_in_flight = asked.frames_in_flight == 0 ? 1 : asked.frames_in_flight,
              .records_bytes_max = asked.records_bytes_max,
              .load_records = asked.start_without_records == 0,
-             .moving_probes_max = asked.moving_probes_max});
+             .moving_probes_max = asked.moving_probes_max,
+             .timestamps = asked.without_timestamps == 0});
         if (!created) return report(created.error());
         *lights = new dimmer_lights{std::move(*created)};
         return DIMMER_OK;

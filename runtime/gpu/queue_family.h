@@ -25,12 +25,12 @@ inline Expected<void> checkQueueFamily(std::string_view field, uint32_t family,
                                        std::span<const VkQueueFamilyProperties> families) {
     if (family >= families.size())
         return fail(ErrorCode::InvalidArgument,
-                    fmt::format("VulkanContext::{} is {}, but the Vulkan device has {} queue families. Set it to the "
+                    fmt::format("{} is {}, but the Vulkan device has {} queue families. Set it to the "
                                 "family that the queue was taken from.",
                                 field, family, families.size()));
     if (families[family].queueFlags & VK_QUEUE_COMPUTE_BIT) return {};
     return fail(ErrorCode::InvalidArgument,
-                fmt::format("VulkanContext::{} is {}, a queue family without compute. Take the queue from a family "
+                fmt::format("{} is {}, a queue family without compute. Take the queue from a family "
                             "with VK_QUEUE_COMPUTE_BIT.",
                             field, family));
 }

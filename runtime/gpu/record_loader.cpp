@@ -1,5 +1,6 @@
 #include <gpu/record_loader.h>
 
+#include <gpu/queue_turn.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -114,6 +115,7 @@ Expected<void> RecordLoader::send(const RecordStore& store) {
     auto submit = vkStruct<VkSubmitInfo>(VK_STRUCTURE_TYPE_SUBMIT_INFO);
     submit.commandBufferCount = 1;
     submit.pCommandBuffers = &commands_.commands;
+    const QueueTurn turn(vulkan_.queue_lock, queue_);
     DIMMER_VK(vkQueueSubmit, queue_, 1, &submit, fence_.get());
     in_flight_ = true;
     return {};

@@ -10,10 +10,14 @@ namespace dimmer {
 namespace {
 
 Expected<void> checkHandles(const VulkanContext& vulkan) {
-    if (vulkan.instance && vulkan.physical_device && vulkan.device && vulkan.queue) return {};
-    return fail(ErrorCode::InvalidArgument,
-                "The VulkanContext has a null handle; instance, physical device, device "
-                "and queue are all needed.");
+    if (!vulkan.instance || !vulkan.physical_device || !vulkan.device || !vulkan.queue)
+        return fail(ErrorCode::InvalidArgument,
+                    "The Vulkan device is given with a null handle; instance, physical device, device and queue are "
+                    "all needed.");
+    if (!vulkan.queue_lock.lock != !vulkan.queue_lock.unlock)
+        return fail(ErrorCode::InvalidArgument,
+                    "The queue has a function to lock it or to unlock it alone: give both.");
+    return {};
 }
 
 Expected<void> checkDevice(const VulkanContext& vulkan) {
@@ -22,7 +26,7 @@ Expected<void> checkDevice(const VulkanContext& vulkan) {
     if (properties.apiVersion < VK_API_VERSION_1_2)
         return fail(
             ErrorCode::Unsupported,
-            fmt::format("VulkanContext::physical_device is a device of Vulkan {}.{}, and the runtime needs 1.2. "
+            fmt::format("physical_device is a device of Vulkan {}.{}, and the runtime needs 1.2. "
                         "Choose another one, or update its driver.",
                         VK_API_VERSION_MAJOR(properties.apiVersion), VK_API_VERSION_MINOR(properties.apiVersion)));
     const auto families = queueFamilies(vulkan.physical_device);
@@ -43,9 +47,15 @@ Expected<SemaphoreHandle> createTimeline(VkDevice device) {
 constexpr uint32_t frames_max = 8;
 
 Expected<void> checkOptions(const RuntimeOptions& options) {
-    if (options.frames_in_flight >= 1 && options.frames_in_flight <= frames_max) return {};
-    return fail(ErrorCode::InvalidArgument, fmt::format("RuntimeOptions::frames_in_flight is {}; it is 1 to {}.",
-                                                        options.frames_in_flight, frames_max));
+    if (options.frames_in_flight < 1 || options.frames_in_flight > frames_max)
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("frames_in_flight is {}; it is 1 to {}.", options.frames_in_flight, frames_max));
+    if (options.mode > UpdateMode::Scatter)
+        return fail(ErrorCode::InvalidArgument, fmt::format("{} is no UpdateMode.", static_cast<int>(options.mode)));
+    if (options.buffering > Buffering::Double)
+        return fail(ErrorCode::InvalidArgument,
+                    fmt::format("{} is no Buffering.", static_cast<int>(options.buffering)));
+    return {};
 }
 
 // Per element, the contributions of that light set that are stored anywhere.

@@ -1,6 +1,7 @@
 // Planning, recording and sending updates.
 #include <gpu/runtime_impl.h>
 
+#include <gpu/queue_turn.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -101,6 +102,7 @@ Expected<void> Runtime::Impl::submitUpdate(const Planner& planner, const Planner
     info.waitSemaphoreCount = wait.semaphore ? 1 : 0;
     info.pWaitSemaphores = &wait.semaphore;
     info.pWaitDstStageMask = &stages;
+    const QueueTurn turn(vulkan.queue_lock, ownQueue());
     DIMMER_VK(vkQueueSubmit, ownQueue(), 1, &info, VK_NULL_HANDLE);
     submitted = lists[list].submitted = value;
     return {};
@@ -185,6 +187,7 @@ void Runtime::finish() {
 }
 
 Expected<UpdateStats> Runtime::record(VkCommandBuffer commands) {
+    if (!commands) return fail(ErrorCode::InvalidArgument, "record() needs a command buffer, and got a null handle.");
     UpdateStats planned;
     if (!planNext(planned)) return planned;
     const uint32_t list_before = impl_->list;

@@ -64,7 +64,7 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t a
         fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
                     "exceeds what this Vulkan device holds and reads as one texel buffer, {} bytes. Cook with fewer "
                     "texels per metre or a higher activity threshold, or, where it is the records alone, "
-                    "load fewer at a time: load_records = false and a smaller records_bytes_max.",
+                    "load fewer at a time: start without records, with a smaller records_bytes_max.",
                     payload_bytes, base_bytes, work_bytes, bytes_max));
 }
 
@@ -117,7 +117,7 @@ Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& trans
                         fmt::format("The records that are loaded at the start, {}, take {} bytes: create the runtime "
                                     "with a records_bytes_max of as many at least{}.",
                                     all ? "all of them" : "those of always-on light that doors let through", bytes,
-                                    all ? ", or, where light sets are to come and go, with load_records = false" : ""));
+                                    all ? ", or, where light sets are to come and go, start without records" : ""));
         }
         queue.add(RecordQueue::no_light_set, k, records_);
     }

@@ -1,5 +1,6 @@
 #include <gpu/transfer.h>
 
+#include <gpu/queue_turn.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
@@ -58,10 +59,15 @@ Expected<void> Transfer::run(const std::function<void(VkCommandBuffer)>& record)
     submit.pCommandBuffers = &commands_;
     const VkFence fence = fence_.get();
     DIMMER_VK(vkResetFences, vulkan_.device, 1, &fence);
-    DIMMER_VK(vkQueueSubmit, vulkan_.queue, 1, &submit, fence);
+    {
+        const QueueTurn turn(vulkan_.queue_lock, vulkan_.queue);
+        DIMMER_VK(vkQueueSubmit, vulkan_.queue, 1, &submit, fence);
+    }
     const VkResult waited = vkWaitForFences(vulkan_.device, 1, &fence, VK_TRUE, std::numeric_limits<uint64_t>::max());
     // The device must be done with all of this in any case.
-    if (waited != VK_SUCCESS) DIMMER_VK(vkQueueWaitIdle, vulkan_.queue);
+    if (waited == VK_SUCCESS) return {};
+    const QueueTurn turn(vulkan_.queue_lock, vulkan_.queue);
+    DIMMER_VK(vkQueueWaitIdle, vulkan_.queue);
     return {};
 }
 

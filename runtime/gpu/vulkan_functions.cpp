@@ -76,14 +76,14 @@ Expected<VulkanFunctions> VulkanFunctions::load(PFN_vkGetInstanceProcAddr get_in
     if (!get)
         return fail(ErrorCode::Unsupported,
                     fmt::format("Vulkan's loader, {}, is not installed or cannot be opened. Install it, or set "
-                                "VulkanContext::get_instance_proc_addr to the one that the instance is of.",
+                                "get_instance_proc_addr to the one that the instance is of.",
                                 loader_libraries[0]));
     FunctionList found;
     for (size_t i = 0; i < found.size(); ++i) {
         found[i] = get(instance, function_names[i]);
         if (!found[i])
             return fail(ErrorCode::Unsupported,
-                        fmt::format("Vulkan's loader has no {} for VulkanContext::instance. Create the instance for "
+                        fmt::format("Vulkan's loader has no {} for the instance that is given. Create the instance for "
                                     "Vulkan 1.2 (VkApplicationInfo::apiVersion).",
                                     function_names[i]));
     }
@@ -92,7 +92,7 @@ Expected<VulkanFunctions> VulkanFunctions::load(PFN_vkGetInstanceProcAddr get_in
         use(found);
     else if (found != functions_in_use)
         return fail(ErrorCode::Unsupported,
-                    "VulkanContext::get_instance_proc_addr gives other functions than those of a runtime that lives. "
+                    "get_instance_proc_addr gives other functions than those of a runtime that lives. "
                     "Give all runtimes the same loader's.");
     ++functions_holders;
     VulkanFunctions held;

@@ -92,6 +92,11 @@ VKAPI_ATTR PFN_vkVoidFunction VKAPI_CALL countingLoader(VkInstance instance, con
     return vkGetInstanceProcAddr(instance, name);
 }
 
+// Submissions under way, and all that were.
+struct QueueUses {
+    int now = 0, all = 0;
+} queue_uses;
+
 dimmer_vulkan vulkanOf(const VulkanContext& context) {
     return {.instance = context.instance,
             .physical_device = context.physical_device,
@@ -101,7 +106,14 @@ dimmer_vulkan vulkanOf(const VulkanContext& context) {
             .compute_queue = VK_NULL_HANDLE,
             .compute_queue_family = 0,
             .get_instance_proc_addr = countingLoader,
-            .pipeline_cache = VK_NULL_HANDLE};
+            .pipeline_cache = VK_NULL_HANDLE,
+            .lock_queue =
+                [](void* user, VkQueue) {
+                    auto& uses = *static_cast<QueueUses*>(user);
+                    ++uses.now, ++uses.all;
+                },
+            .unlock_queue = [](void* user, VkQueue) { --static_cast<QueueUses*>(user)->now; },
+            .lock_user = &queue_uses};
 }
 
 TEST_F(CInterfaceGpu, BlendsByVulkan) {
@@ -111,6 +123,8 @@ TEST_F(CInterfaceGpu, BlendsByVulkan) {
         blend_on_vulkan(PackOnDisk().path.c_str(), &vulkan, pages.irradiance.data(), pages.direction.data(), 2048), 0)
         << problem;
     EXPECT_GT(functions_asked_for, 0u);
+    EXPECT_GT(queue_uses.all, 0);
+    EXPECT_EQ(queue_uses.now, 0);
     const BlendedPages expected = expectedPages();
     EXPECT_EQ(pages.irradiance, expected.irradiance);
     EXPECT_EQ(pages.direction, expected.direction);

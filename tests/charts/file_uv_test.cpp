@@ -40,7 +40,7 @@ TEST(FileUv, PiecesFarApartAreChartsOfTheirOwn) {
     const Unwrap charts = chartsOf(scene);
     ASSERT_EQ(charts.charts.size(), 2u);
     for (const auto& chart : charts.charts) {
-        EXPECT_TRUE(chart.of_file);
+        EXPECT_TRUE(chart.curved);
         EXPECT_NEAR(chart.width, 10 + 2, 1);  // 1 m at 10 texels, and padding; rounding up
         EXPECT_NEAR(chart.height, 10 + 2, 1);
     }

@@ -35,7 +35,7 @@ TEST(PlanarCharts, OfManyPartsCompareNeighboursAlone) {
         asked = 0;
         const auto faces = along_x ? tiles(count, 1, 0.125f, 0.03125f) : tiles(1, count, 0.125f, 0.03125f);
         size_t found = 0;
-        for (const PlanarChart& chart : planarCharts(faces, 1u << 20, {blocked, {}})) found += chart.faces.size();
+        for (const ProjectedChart& chart : planarCharts(faces, 1u << 20, {blocked, {}})) found += chart.faces.size();
         EXPECT_EQ(found, faces.size());
         EXPECT_LT(asked, size_t{100} * count);
     }
@@ -55,7 +55,7 @@ TEST(PlanarCharts, LieAlongTheEdgesOfWhatIsTurned) {
     const auto charts = planarCharts(faces, 1u << 20);
     ASSERT_EQ(charts.size(), 3u);
     EXPECT_NEAR(charts[0].size_m.x * charts[0].size_m.y, 4, 1e-3);
-    for (const PlanarChart& chart : std::span(charts).subspan(1)) {
+    for (const ProjectedChart& chart : std::span(charts).subspan(1)) {
         EXPECT_NEAR(chart.size_m.x, 3, 1e-3);
         EXPECT_NEAR(chart.size_m.y, 3, 1e-3);
         EXPECT_NEAR(glm::dot(chart.u_axis, chart.v_axis), 0, 1e-6);
@@ -105,7 +105,7 @@ TEST(PlanarCharts, LookForWallsWhereSomethingStands) {
 TEST(PlanarCharts, WallsPartTilesThatTouch) {
     const auto between = [](glm::vec3 a, glm::vec3 b) { return std::floor(a.x) != std::floor(b.x); };
     const auto charts = planarCharts(tiles(50, 1, 1, 0), 1u << 20, {between, {}});
-    for (const PlanarChart& chart : charts) EXPECT_LT(chart.size_m.x, 1.001f);
+    for (const ProjectedChart& chart : charts) EXPECT_LT(chart.size_m.x, 1.001f);
     EXPECT_EQ(charts.size(), 50u);
 }
 

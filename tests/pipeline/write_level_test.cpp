@@ -351,7 +351,7 @@ TEST(WriteLevel, ImportsAsTheSameLevelWithoutNewCharts) {
     const auto lit =
         std::ranges::count_if(after->meshes, [](const SceneMesh& m) { return m.lighting != Lighting::Dynamic; });
     EXPECT_GE(charts->charts.size(), static_cast<size_t>(lit));
-    EXPECT_TRUE(std::ranges::all_of(charts->charts, &Chart::of_file));
+    EXPECT_TRUE(std::ranges::all_of(charts->charts, &Chart::curved));
 }
 
 // The level that was written, cooked, is lit like its source.

@@ -282,6 +282,11 @@ typedef struct dimmer_vulkan {
      * that one's. The functions are the process's: all lights that live at one time need the same ones. */
     PFN_vkGetInstanceProcAddr get_instance_proc_addr;
     VkPipelineCache pipeline_cache; /* optional: create makes its pipelines with it */
+    /* Optional, both or neither: called around each single use of a queue, which is short and never within another one.
+     * For games with threads that submit to the same queues meanwhile, as frames go on while a level is created. */
+    void (*lock_queue)(void* user, VkQueue queue);
+    void (*unlock_queue)(void* user, VkQueue queue);
+    void* lock_user; /* the first argument of both */
 } dimmer_vulkan;
 
 typedef enum dimmer_buffering {
@@ -299,10 +304,12 @@ typedef struct dimmer_vulkan_options {
      * are loaded and dropped as the game moves on. */
     uint64_t records_bytes_max;
     int start_without_records; /* not 0: every light set is held at 0 until dimmer_lights_load_records() brings it */
+    int without_timestamps;    /* not 0: dimmer_update_stats::gpu_us stays 0 */
 } dimmer_vulkan_options;
 
 /* `options`: may be null. DIMMER_INVALID_ARGUMENT: a null handle (only compute_queue and pipeline_cache may be), a
- * queue family that the device does not have, or one without compute; options out of their range. DIMMER_UNSUPPORTED: a
+ * queue family that the device does not have, or one without compute; options out of their range.
+ * DIMMER_OUT_OF_MEMORY: of the device's or the host's, or records_bytes_max is too little. DIMMER_UNSUPPORTED: a
  * device below Vulkan 1.2, or one without a format or limit that the pack needs; a loader without a function of
  * Vulkan 1.2, or another one than lights have that live. */
 dimmer_result dimmer_lights_create_vulkan(const dimmer_pack* pack, const dimmer_vulkan* vulkan,

@@ -10,6 +10,14 @@
 
 namespace dimmer {
 
+// How a queue is shared with other threads: both functions are called around each single use of it (a submission, or a
+// wait for it to be idle), which is short; never one within the other. They must not throw, nor call the runtime.
+struct QueueLock {
+    void (*lock)(void* user, VkQueue queue) = nullptr;
+    void (*unlock)(void* user, VkQueue queue) = nullptr;
+    void* user = nullptr;
+};
+
 // The caller's device; it must outlive the runtime. Needs Vulkan 1.2, of the instance too, and a queue family with
 // compute; no optional feature beyond timelineSemaphore (core in 1.2): every runtime has such a semaphore.
 struct VulkanContext {
@@ -28,6 +36,9 @@ struct VulkanContext {
     PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
     // Optional: create() makes its pipelines, up to 25 small ones, with it. Synchronised as it was made to be.
     VkPipelineCache pipeline_cache = VK_NULL_HANDLE;
+    // Optional: for games with threads that submit to the same queues meanwhile, as frames go on while a level is
+    // created. Empty: the caller keeps them out for as long as a call takes that uses a queue.
+    QueueLock queue_lock{};
 };
 
 // How pages are updated. All give the same bits; every one but the first is there to be compared and to check with.
@@ -100,12 +111,13 @@ struct DeviceFootprint {
     uint32_t pipelines = 0;  // compute pipelines
 };
 
-// Not thread-safe; external synchronisation of the queue is the caller's, as in Vulkan itself.
+// Not thread-safe; external synchronisation of the queue is the caller's, as in Vulkan itself: QueueLock.
 class Runtime : public LightState {
    public:
     // Uploads the pack's records and the base pages (blocking). Device memory: footprint().
     // InvalidArgument: a null handle (only compute_queue and pipeline_cache may be), a queue family that is not there,
-    // or one without compute; frames_in_flight out of range. Unsupported: a device below Vulkan 1.2, or without a
+    // or one without compute; options out of their range. OutOfMemory: of the device's or the host's, or
+    // records_bytes_max is too little. Unsupported: a device below Vulkan 1.2, or without a
     // format or limit that the pack needs; a loader without a function of Vulkan 1.2, or another one than a runtime has
     // that lives. Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});

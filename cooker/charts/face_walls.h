@@ -1,0 +1,52 @@
+// Walls between faces that lie near one another on one surface.
+#pragma once
+
+#include <charts/axes.h>
+#include <charts/planar.h>
+#include <charts/polygon.h>
+
+#include <optional>
+#include <vector>
+
+namespace dimmer::cook {
+
+// Closer points are in one place.
+inline constexpr float touching_m = 1e-3f;
+// Bilinear filtering and padding reach this far.
+inline constexpr float filter_reach_texels = 2;
+// A surface this high over another one hides it: the points that texels are lit at lie lower (texels.cpp).
+inline constexpr float hiding_m = 5e-4f;
+
+// Which faces a wall parts from one. Thread-safe; holds on to what it is made of.
+class FaceWalls {
+   public:
+    struct Reach {
+        float near_m;               // faces further off are not asked for
+        float largest_m;            // side of the faces that are
+        float lowest_m, highest_m;  // over the plane of the one, of those faces
+    };
+    FaceWalls(const PlanarFace& face, const Axes& axes, const Reach& reach, const Standing& standing);
+
+    // Nothing stands where a wall would.
+    bool none() const { return shadows_ && shadows_->empty(); }
+    bool partFrom(const PlanarFace& other) const;
+
+   private:
+    std::optional<std::vector<Rect>> shadowsNear(const Standing& standing) const;
+    Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, float low, float high) const;
+    bool mayPart(Rect a, const Rect& b) const;
+    bool wallBetween(const PlanarFace& a, const PlanarFace& b) const;
+
+    const PlanarFace& face_;
+    Axes axes_;
+    Reach reach_;
+    const std::function<bool(glm::vec3, glm::vec3)>& blocked_;
+    // Of all that stands as high as a wall, where it is in the plane; nothing: there are too many.
+    std::optional<std::vector<Rect>> shadows_;
+};
+
+glm::vec3 middleOf(const PlanarFace& face);
+// On the edges of a face, nearest to a point.
+glm::vec3 nearestOnEdges(const PlanarFace& face, glm::vec3 p);
+
+}  // namespace dimmer::cook
