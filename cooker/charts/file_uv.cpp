@@ -1,6 +1,8 @@
 #include <charts/file_uv.h>
 
+#include <charts/polygon.h>
 #include <charts/raster.h>
+#include <charts/unwrap.h>
 
 #include <algorithm>
 #include <bit>
@@ -19,6 +21,9 @@ constexpr uint32_t overlap_grid = 1024;
 constexpr float least_span = 1.0f / 16384;
 // As far beyond 0..1 as tools round, and far less than a texel.
 constexpr float rounding = 1e-5f;
+
+// Of a texel: what reaches into it by less is rounding.
+constexpr float least_share = 1e-4f;
 
 struct UvBounds {
     glm::vec2 low{1}, high{0};
@@ -106,6 +111,35 @@ std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span
         pieces[piece_of[first]].push_back(i);
     }
     return pieces;
+}
+
+bool piecesBleed(const PlacedPieces& pieces, glm::uvec2 size) {
+    constexpr uint32_t nothing = UINT32_MAX, several = UINT32_MAX - 1;
+    // A texel beside two pieces is padding of one alone.
+    constexpr uint32_t reach = 2 * padding_texels;
+    std::vector<uint32_t> owner(size_t{size.x} * size.y, nothing);
+    for (uint32_t p = 0; p < pieces.size(); ++p)
+        for (const auto& triangle : pieces[p])
+            forEachCellNear(triangle, size, [&](uint32_t x, uint32_t y) {
+                uint32_t& cell = owner[size_t{y} * size.x + x];
+                if (cell != p && polygonArea(clipToCell(triangle, x, y)) > least_share)
+                    cell = cell == nothing ? p : several;
+            });
+    const auto others = [&](uint32_t x, uint32_t y) {
+        const uint32_t own = owner[size_t{y} * size.x + x];
+        for (uint32_t v = std::max(y, reach) - reach; v <= std::min(y + reach, size.y - 1); ++v)
+            for (uint32_t u = std::max(x, reach) - reach; u <= std::min(x + reach, size.x - 1); ++u)
+                if (const uint32_t near = owner[size_t{v} * size.x + u]; near != own && near != nothing) return true;
+        return own == several;
+    };
+    size_t covered = 0, mixed = 0;
+    for (uint32_t y = 0; y < size.y; ++y)
+        for (uint32_t x = 0; x < size.x; ++x) {
+            if (owner[size_t{y} * size.x + x] == nothing) continue;
+            ++covered;
+            mixed += others(x, y);
+        }
+    return 100 * mixed > covered;
 }
 
 }  // namespace dimmer::cook

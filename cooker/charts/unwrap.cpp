@@ -2,16 +2,15 @@
 
 #include <charts/curved.h>
 #include <charts/file_uv.h>
+#include <charts/pages.h>
 #include <charts/planar.h>
 #include <charts/raster.h>
 
 #include <fmt/format.h>
-#include <stb_rect_pack.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 namespace dimmer::cook {
 namespace {
@@ -76,56 +75,99 @@ struct FileUvs {
     glm::uvec2 texels(float scale) const { return glm::uvec2(glm::ceil((high - low) * scale)) + 2 * padding_texels; }
 };
 
-// The file's own UVs, scaled to the wanted density on average: one chart, or where that takes fewer texels one for each
-// piece of the unwrap, as those of a mesh may lie anywhere in an atlas of many.
-std::vector<Placed> fileCharts(const RayScene& rays, Unwrap& out, const std::vector<uint32_t>& ids, float density,
-                               uint32_t side_max) {
-    const std::vector<Face>& faces = out.faces;
-    const SceneMesh& mesh = rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh];
-    const auto triangleOf = [&](uint32_t id) { return rays.triangles()[faces[id].triangle].triangle; };
-    const auto uvOf = [&](uint32_t id, int i) { return mesh.uv1[mesh.triangles[triangleOf(id)][i]]; };
-    double area_m2 = 0, area_uv = 0;
-    const auto add = [&](FileUvs& part, uint32_t id) {
+// Where a mesh's own UVs are to lie, as one chart or as one for each piece of the unwrap.
+class FileUnwrap {
+   public:
+    FileUnwrap(const RayScene& rays, const std::vector<Face>& faces, const std::vector<uint32_t>& ids, float density,
+               uint32_t side_max)
+        : rays_(rays),
+          faces_(faces),
+          mesh_(rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh]),
+          usable_(static_cast<float>(side_max - 2 * padding_texels) - 1) {
+        double area_m2 = 0, area_uv = 0;
+        std::vector<uint32_t> triangles;
+        for (uint32_t id : ids) {
+            const auto c = corners(rays, faces[id]);
+            area_m2 += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
+            area_uv += 0.5 * std::abs(cross2d(uvOf(id, 1) - uvOf(id, 0), uvOf(id, 2) - uvOf(id, 0)));
+            add(whole_, id);
+            triangles.push_back(triangleOf(id));
+        }
+        for (const auto& piece : unwrapPieces(mesh_, triangles)) {
+            FileUvs& part = pieces_.emplace_back();
+            for (const uint32_t i : piece) add(part, ids[i]);
+        }
+        scale_ = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
+    }
+
+    // Piece by piece where that takes fewer texels, as those of a mesh may lie anywhere in an atlas of many, or where
+    // they would show each other's light: of gaps that were made for a larger page too little is left.
+    std::vector<FileUvs> parts() const {
+        double in_pieces = 0;
+        for (const FileUvs& piece : pieces_) in_pieces += areaOf(piece);
+        if (in_pieces < areaOf(whole_) || bleed()) return pieces_;
+        return {whole_};
+    }
+
+    float texelsAcross(const FileUvs& part) const { return scale_ * extentOf(part); }
+
+    Placed placed(const FileUvs& part) const {
+        const float scale = scaleOf(part);
+        const glm::uvec2 texels = part.texels(scale);
+        Placed chart{texels.x, texels.y, part.ids, {}, true};
+        for (const uint32_t id : part.ids) chart.uv_texels.push_back(placeOf(id, part, scale));
+        return chart;
+    }
+
+   private:
+    uint32_t triangleOf(uint32_t id) const { return rays_.triangles()[faces_[id].triangle].triangle; }
+    glm::vec2 uvOf(uint32_t id, int i) const { return mesh_.uv1[mesh_.triangles[triangleOf(id)][i]]; }
+    static float extentOf(const FileUvs& part) { return std::max(part.high.x - part.low.x, part.high.y - part.low.y); }
+    float scaleOf(const FileUvs& part) const { return std::min(scale_, usable_ / extentOf(part)); }
+
+    void add(FileUvs& part, uint32_t id) const {
         part.ids.push_back(id);
         for (int i = 0; i < 3; ++i)
             part.low = glm::min(part.low, uvOf(id, i)), part.high = glm::max(part.high, uvOf(id, i));
-    };
-    FileUvs whole;
-    std::vector<uint32_t> triangles;
-    for (uint32_t id : ids) {
-        const auto c = corners(rays, faces[id]);
-        area_m2 += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
-        area_uv += 0.5 * std::abs(cross2d(uvOf(id, 1) - uvOf(id, 0), uvOf(id, 2) - uvOf(id, 0)));
-        add(whole, id);
-        triangles.push_back(triangleOf(id));
     }
-    std::vector<FileUvs> parts;
-    for (const auto& piece : unwrapPieces(mesh, triangles)) {
-        FileUvs& part = parts.emplace_back();
-        for (const uint32_t i : piece) add(part, ids[i]);
-    }
-    const float scale = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
-    const auto areaAt = [&](const FileUvs& part) {
-        const glm::vec2 size = (part.high - part.low) * scale + static_cast<float>(2 * padding_texels);
+
+    double areaOf(const FileUvs& part) const {
+        const glm::vec2 size = (part.high - part.low) * scale_ + static_cast<float>(2 * padding_texels);
         return double{size.x} * double{size.y};
-    };
-    double in_parts = 0;
-    for (const FileUvs& part : parts) in_parts += areaAt(part);
-    if (in_parts >= areaAt(whole)) parts = {std::move(whole)};
+    }
+
+    std::array<glm::vec2, 3> placeOf(uint32_t id, const FileUvs& part, float scale) const {
+        std::array<glm::vec2, 3> uv;
+        for (int i = 0; i < 3; ++i)
+            uv[static_cast<size_t>(i)] = (uvOf(id, i) - part.low) * scale + static_cast<float>(padding_texels);
+        return uv;
+    }
+
+    bool bleed() const {
+        if (pieces_.size() < 2) return false;
+        const float scale = scaleOf(whole_);
+        PlacedPieces placed(pieces_.size());
+        for (size_t p = 0; p < pieces_.size(); ++p)
+            for (const uint32_t id : pieces_[p].ids) placed[p].push_back(placeOf(id, whole_, scale));
+        return piecesBleed(placed, whole_.texels(scale));
+    }
+
+    const RayScene& rays_;
+    const std::vector<Face>& faces_;
+    const SceneMesh& mesh_;
+    float usable_, scale_ = 1;
+    FileUvs whole_;
+    std::vector<FileUvs> pieces_;
+};
+
+// The file's own UVs, scaled to the wanted density on average.
+std::vector<Placed> fileCharts(const RayScene& rays, Unwrap& out, const std::vector<uint32_t>& ids, float density,
+                               uint32_t side_max) {
+    const FileUnwrap file(rays, out.faces, ids, density, side_max);
     std::vector<Placed> charts;
-    for (FileUvs& part : parts) {
-        const float extent = std::max(part.high.x - part.low.x, part.high.y - part.low.y);
-        warnOfCoarseness(rays, out, part.ids[0], scale * extent, side_max);
-        const float fits = std::min(scale, (static_cast<float>(side_max - 2 * padding_texels) - 1) / extent);
-        const glm::uvec2 texels = part.texels(fits);
-        Placed placed{texels.x, texels.y, std::move(part.ids), {}, true};
-        for (uint32_t id : placed.faces) {
-            std::array<glm::vec2, 3> uv;
-            for (int i = 0; i < 3; ++i)
-                uv[static_cast<size_t>(i)] = (uvOf(id, i) - part.low) * fits + static_cast<float>(padding_texels);
-            placed.uv_texels.push_back(uv);
-        }
-        charts.push_back(std::move(placed));
+    for (const FileUvs& part : file.parts()) {
+        warnOfCoarseness(rays, out, part.ids[0], file.texelsAcross(part), side_max);
+        charts.push_back(file.placed(part));
     }
     return charts;
 }
@@ -156,77 +198,6 @@ Placed projectedChart(const RayScene& rays, const std::vector<Face>& faces, cons
         placed.uv_texels.push_back(uv);
     }
     return placed;
-}
-
-bool tryPack(std::vector<stbrp_rect>& rects, int width, int height) {
-    std::vector<stbrp_node> nodes(static_cast<size_t>(width));
-    stbrp_context context;
-    stbrp_init_target(&context, width, height, nodes.data(), width);
-    return stbrp_pack_rects(&context, rects.data(), static_cast<int>(rects.size())) != 0;
-}
-
-std::vector<stbrp_rect> rectsOf(std::span<const glm::uvec2> charts, const std::vector<uint32_t>& ids) {
-    std::vector<stbrp_rect> rects;
-    for (uint32_t id : ids) {
-        stbrp_rect r{};
-        r.id = static_cast<int>(id);
-        r.w = static_cast<stbrp_coord>(charts[id].x);
-        r.h = static_cast<stbrp_coord>(charts[id].y);
-        rects.push_back(r);
-    }
-    return rects;
-}
-
-// On square pages of `side`, as many as it takes; false where those are more than `count_max`. Pages end with the
-// lowest chart of all.
-bool fillPages(std::span<const glm::uvec2> charts, uint32_t side, uint32_t count_max, Unwrap& out) {
-    std::vector<uint32_t> rest(charts.size());
-    std::iota(rest.begin(), rest.end(), 0u);
-    out.charts.resize(charts.size());
-    uint32_t height = 0;
-    for (out.page_count = 0; !rest.empty(); ++out.page_count) {
-        if (out.page_count == count_max) return false;
-        auto rects = rectsOf(charts, rest);
-        tryPack(rects, static_cast<int>(side), static_cast<int>(side));
-        rest.clear();
-        for (const stbrp_rect& r : rects) {
-            const auto id = static_cast<uint32_t>(r.id);
-            if (!r.was_packed) {
-                rest.push_back(id);
-                continue;
-            }
-            const auto x = static_cast<uint32_t>(r.x), y = static_cast<uint32_t>(r.y);
-            out.charts[id] = {out.page_count, x, y, charts[id].x, charts[id].y};
-            height = std::max(height, y + charts[id].y);
-        }
-        std::ranges::sort(rest);
-    }
-    out.page_count = std::max(out.page_count, 1u);
-    out.page_width = side;
-    out.page_height = std::min(side, (height + 7) / 8 * 8);
-    return true;
-}
-
-// As few pages as will do, and those as small as will do. Sides are multiples of 64 texels.
-bool packPages(std::span<const glm::uvec2> charts, uint32_t page_size, Unwrap& out) {
-    constexpr uint32_t side_step = 64, pages_max = 256;
-    uint64_t area = 0;
-    uint32_t largest = side_step;
-    for (const glm::uvec2 c : charts) {
-        area += uint64_t{c.x} * c.y;
-        largest = std::max({largest, c.x, c.y});
-    }
-    const auto sideFor = [&](uint32_t pages) {
-        const auto side = static_cast<uint32_t>(std::sqrt(static_cast<double>(area) / pages));
-        return std::max((side + side_step - 1) / side_step, (largest + side_step - 1) / side_step) * side_step;
-    };
-    for (uint32_t side = sideFor(1); side <= page_size; side += side_step)
-        if (fillPages(charts, side, 1, out)) return true;
-    if (!fillPages(charts, page_size, pages_max, out)) return false;
-    const uint32_t pages = out.page_count;
-    for (uint32_t side = sideFor(pages); side < page_size; side += side_step)
-        if (fillPages(charts, side, pages, out)) return true;
-    return fillPages(charts, page_size, pages, out);
 }
 
 BoxTree boxesOf(const RayScene& rays) {
@@ -313,21 +284,6 @@ bool sameFrame(const TangentFrame& a, const TangentFrame& b) {
     constexpr float same_cos = 0.99f;
     return glm::dot(a.normal, b.normal) > same_cos && glm::dot(a.tangent, b.tangent) > same_cos &&
            glm::dot(a.bitangent, b.bitangent) > same_cos;
-}
-
-uint64_t pageTexels(std::span<const glm::uvec2> charts, uint32_t page_size) {
-    Unwrap out;
-    if (!packPages(charts, page_size, out)) return UINT64_MAX;
-    return uint64_t{out.page_width} * out.page_height * out.page_count;
-}
-
-glm::uvec2 chartSize(glm::uvec2 size, double factor) {
-    const auto side = [&](uint32_t texels) {
-        // Sides were rounded up, but where they are whole metres: rather too large than too small.
-        const double inner = static_cast<double>(texels - 2 * padding_texels) / factor;
-        return static_cast<uint32_t>(std::max(1.0, std::ceil(inner - 0.01))) + 2 * padding_texels;
-    };
-    return factor == 1 ? size : glm::uvec2(side(size.x), side(size.y));
 }
 
 Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {

@@ -72,9 +72,4 @@ struct UnwrapOptions {
 // wall stands between parts that come close to one another (filtering would leak through it).
 Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options);
 
-// Texels of the pages that charts of these sizes fill, as unwrap() packs them; UINT64_MAX: of too many pages.
-uint64_t pageTexels(std::span<const glm::uvec2> charts, uint32_t page_size);
-// About the size of a chart, padding included, whose texels are `factor` times as long.
-glm::uvec2 chartSize(glm::uvec2 size, double factor);
-
 }  // namespace dimmer::cook

@@ -1,6 +1,7 @@
 #include <pipeline/losses.h>
 
 #include <bake/sampling.h>
+#include <charts/pages.h>
 #include <pack/pack_data.h>
 #include <pipeline/light_error.h>
 

@@ -47,11 +47,52 @@ TEST(FileUv, PiecesFarApartAreChartsOfTheirOwn) {
     EXPECT_EQ(charts.page_width, 64u);  // the least
 }
 
-// With an eighth of a square between them two charts and their padding take more than one.
-TEST(FileUv, PiecesSideBySideStayOneChart) {
-    const Unwrap charts = chartsOf(twoSquares({0.2f, 0.3f}, {0.3125f, 0.3f}));
+// The halves of a square of 1 m that is cut along its diagonal, so far apart on the unwrap.
+Scene twoHalves(float apart_uv) {
+    Scene scene;
+    SceneMesh& mesh = addQuad(scene, "floor", {0, 0, 0}, {0, 0, 0.5f}, {0.5f, 0, 0}, addMaterial(scene, lambert(0.5f)));
+    for (const int corner : {0, 2}) {
+        mesh.positions_m.push_back(mesh.positions_m[static_cast<size_t>(corner)]);
+        mesh.normals.push_back(mesh.normals[0]);
+    }
+    mesh.triangles[1] = {4, 5, 3};
+    const glm::vec2 apart(apart_uv);
+    mesh.uv1 = {glm::vec2(0.1f, 0),        {0, 0}, {0, 0.1f}, glm::vec2(0.1f, 0.1f) + apart, apart + glm::vec2(0.1f, 0),
+                apart + glm::vec2(0, 0.1f)};
+    return scene;
+}
+
+// Pieces that lie in each other's corners take less together, padding of their own and all.
+TEST(FileUv, PiecesWithRoomBetweenStayOneChart) {
+    const Unwrap charts = chartsOf(twoHalves(0.03f));
     ASSERT_EQ(charts.charts.size(), 1u);
-    EXPECT_NEAR(charts.charts[0].width, 21 + 2, 1);
+    EXPECT_NEAR(charts.charts[0].width, 13 + 2, 1);
+    EXPECT_EQ(chartsOf(twoHalves(0.005f)).charts.size(), 2u);
+}
+
+// 1 m is 10 texels, and a square 0.1 of the unwrap. With less than two texels between them, whose two edges filtering
+// reads at both, one would show the other's light.
+TEST(FileUv, PiecesTooCloseToFilterGetChartsOfTheirOwn) {
+    for (const float gap_texels : {0.1f, 0.5f, 1.0f, 1.5f}) {
+        const Unwrap charts = chartsOf(twoSquares({0, 0}, {0.1f + 0.01f * gap_texels, 0}));
+        EXPECT_EQ(charts.charts.size(), 2u) << gap_texels;
+    }
+}
+
+std::vector<std::array<glm::vec2, 3>> squareAt(glm::vec2 low, float side) {
+    const glm::vec2 b = low + glm::vec2(side, 0), c = low + side, d = low + glm::vec2(0, side);
+    return {{low, b, c}, {low, c, d}};
+}
+
+TEST(FileUv, FewTexelsInTouchAreNoBleeding) {
+    const auto large = squareAt({1, 1}, 40);
+    EXPECT_FALSE(piecesBleed({large}, {64, 64}));
+    EXPECT_FALSE(piecesBleed({large, squareAt({43.5f, 1}, 10)}, {64, 64}));
+    EXPECT_TRUE(piecesBleed({large, squareAt({41.5f, 1}, 10)}, {64, 64}));
+    EXPECT_FALSE(piecesBleed({large, squareAt({41.5f, 41.5f}, 10)}, {64, 64})) << "at a corner";
+    EXPECT_FALSE(piecesBleed({large, squareAt({41.00001f + 1, 1}, 0.00001f)}, {64, 64})) << "too small to have a texel";
+    EXPECT_TRUE(piecesBleed({squareAt({1, 1}, 4), squareAt({5, 5}, 4)}, {16, 16})) << "one is a quarter of a few";
+    EXPECT_TRUE(piecesBleed({large, large}, {64, 64}));
 }
 
 std::string faultOf(glm::vec2 first, glm::vec2 second, glm::vec2 scale, glm::vec2 shift = {}) {

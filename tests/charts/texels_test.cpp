@@ -1,5 +1,6 @@
 // Where the sample points of texels lie.
 #include <bake/test_scenes.h>
+#include <charts/pages.h>
 #include <charts/texels.h>
 #include <charts/unwrap.h>
 #include <gtest/gtest.h>

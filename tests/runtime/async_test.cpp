@@ -379,7 +379,7 @@ TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpForAfterIdleUpdates) {
         ASSERT_TRUE(gpu.apply("all=0.5"));
         const uint32_t shown = gpu.pageSet(), probes_shown = gpu.probeSet();
         recordInVain(gpu);
-        EXPECT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+        EXPECT_EQ(gpu.record(test::untouchedCommands())->dispatches, 0u);
         EXPECT_EQ(gpu.submit()->dispatches, 0u);
         gpu.discardRecorded();
         EXPECT_EQ(gpu.pageSet(), shown);
@@ -398,7 +398,7 @@ TEST_F(AsyncTest, ARecordingThatNeverRunsIsMadeUpForAfterSetsChangedPlaces) {
     ASSERT_TRUE(gpu.apply("all=0.5"));
     recordInVain(gpu);
     ASSERT_TRUE(gpu.apply("all=1"));
-    ASSERT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+    ASSERT_EQ(gpu.record(test::untouchedCommands())->dispatches, 0u);
     ASSERT_EQ(gpu.pageSet(), shown);
     gpu.discardRecorded();
     ASSERT_TRUE(gpu.apply("all=0.5"));
@@ -414,7 +414,7 @@ TEST_F(AsyncTest, TakingBackWhatDidRunLeavesThePagesExact) {
         ASSERT_TRUE(gpu.submit() && gpu.wait());
         ASSERT_TRUE(gpu.apply("all=0.5"));
         recordAndRun(gpu);
-        EXPECT_EQ(gpu.record(VK_NULL_HANDLE)->dispatches, 0u);
+        EXPECT_EQ(gpu.record(test::untouchedCommands())->dispatches, 0u);
         gpu.discardRecorded();
         ASSERT_TRUE(gpu.apply("all=1"));
         ASSERT_TRUE(gpu.submit());

@@ -132,7 +132,7 @@ TEST_F(RuntimeTest, NothingChangedIsNoDispatchAndNoSubmission) {
     EXPECT_EQ(stats->dispatches, 0u);
     EXPECT_EQ(stats->bytes_read, 0u);
     EXPECT_EQ(runtime.semaphoreValue(), value);
-    EXPECT_EQ(runtime.record(VK_NULL_HANDLE)->dispatches, 0u);  // touches no command buffer
+    EXPECT_EQ(runtime.record(test::untouchedCommands())->dispatches, 0u);
     EXPECT_EQ(runtime.semaphoreValue(), value);
 }
 
@@ -147,7 +147,7 @@ TEST_F(RuntimeTest, WhatWasPutOffIsCountedWhereNothingElseWas) {
     for (const bool records : {false, true}) {
         const char* state = records ? "set3=0.25" : "set3=0.5";
         ASSERT_TRUE(gpu.apply(state) && cpu.apply(state));
-        const auto stats = records ? gpu.record(VK_NULL_HANDLE) : gpu.submit();
+        const auto stats = records ? gpu.record(test::untouchedCommands()) : gpu.submit();
         ASSERT_TRUE(stats) << stats.error().message;
         const UpdateStats expected = cpu.update();
         expectEqualCounts(*stats, expected);
