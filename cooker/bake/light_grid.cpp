@@ -67,7 +67,7 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
         const PunctualLight& light = lights[l];
         identity_.push_back(identityOf(light));
         const bool asked = groups.empty() || groups[groupOf(light.light_set)];
-        if (light.bake == BakeMode::None || !asked) continue;
+        if (light.bake == BakeMode::None || light.intensity == glm::vec3(0) || !asked) continue;
         const bool unlisted = !enabled || light.type == LightType::Directional || light.bake == BakeMode::Full ||
                               isFarOutside(light.position_m);
         (unlisted ? everywhere_ : sought).push_back(l);

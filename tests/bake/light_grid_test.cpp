@@ -44,6 +44,18 @@ TEST(LightGrid, ListsTheLampsOfTheRoomAlone) {
     }
 }
 
+TEST(LightGrid, LampsThatAreOffAreAskedForNowhere) {
+    Scene scene = rooms(2);
+    scene.lights[0].intensity = glm::vec3(0);
+    addPointLight(scene, {0, 0, 0}, 0, BakeMode::Full);
+    const RayScene rays(scene);
+    std::set<uint32_t> asked;
+    const LightGrid grid(rays);
+    for (const glm::vec3 p : {glm::vec3(0), glm::vec3(8, 0, 0)})
+        grid.forEach(p, [&](uint32_t light) { asked.insert(light); });
+    EXPECT_EQ(asked, std::set<uint32_t>{1});
+}
+
 TEST(LightGrid, SpotsReachTheirConeAndRangesEnd) {
     Scene scene;
     addFloor(scene, 40, addMaterial(scene, lambert(0.5f)));
