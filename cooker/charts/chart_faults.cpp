@@ -17,6 +17,14 @@ constexpr float detour_max = 1.5f;
 // Between the middles of two faces that a wall cut it stands at least as high.
 constexpr float cut_wall_m = 0.3f;
 constexpr float about_one_plane_cos = 0.998f;
+// Slopes of up to 60 degrees are ground; what leans more than 53 on them is a wall.
+constexpr float ground_cos_min = 0.5f, flat_cos = 0.8f;
+
+// The normal of the plane that walls stand on: plumb where it is ground, or a ceiling, however that slopes.
+glm::vec3 standsOn(glm::vec3 normal) {
+    if (std::abs(normal.y) < ground_cos_min) return normal;
+    return {0, std::copysign(1.0f, normal.y), 0};
+}
 
 // Whether a point of `a` is over another one of `b`, or seems to be closer to it than it is.
 bool seemsCloser(const PlanarFace& a, const PlanarFace& b, const Axes& axes, float reach_m) {
@@ -59,11 +67,22 @@ ChartPairs ChartFaults::in(std::span<const JoinedCharts> joined) {
     return all;
 }
 
+// Of one that is much smaller than a texel the face in its middle stands for all.
+std::vector<uint32_t> ChartFaults::facesOf(const ProjectedChart& chart) const {
+    if (!chart.curved) return chart.faces;
+    const auto off_m = [&](uint32_t face) {
+        const glm::vec3 p = middleOf(faces_[face]);
+        return glm::length(glm::vec2(glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)) - chart.min_m -
+                           0.5f * chart.size_m);
+    };
+    return {*std::ranges::min_element(chart.faces, {}, off_m)};
+}
+
 std::vector<ChartFaults::Part> ChartFaults::partsOf(const JoinedCharts& joined) const {
     const glm::vec3 normal = glm::cross(joined.axes.u, joined.axes.v);
     std::vector<Part> parts;
     for (const uint32_t c : joined.charts)
-        for (const uint32_t f : charts_[c].faces) {
+        for (const uint32_t f : facesOf(charts_[c])) {
             Part part{c, f, joined.axes.rectOf(faces_[f]), 1e30f, -1e30f};
             for (const glm::vec3 p : faces_[f].corners_m) {
                 const float height_m = glm::dot(normal, p);
@@ -94,7 +113,7 @@ ChartFaults::Found ChartFaults::in(const JoinedCharts& joined) const {
                 others.push_back(parts[k]);
         }
         if (others.empty()) return;
-        const FaceWalls walls(face, Axes(face.normal), reachOf(face, others, reach_m), standing_);
+        const FaceWalls walls = wallsOf(face, others, reach_m);
         for (const Part& other : others)
             if ((!walls.none() && walls.partFrom(faces_[other.face])) || besideWall(face, faces_[other.face]))
                 note(other.chart);
@@ -104,17 +123,22 @@ ChartFaults::Found ChartFaults::in(const JoinedCharts& joined) const {
     return all;
 }
 
-FaceWalls::Reach ChartFaults::reachOf(const PlanarFace& face, std::span<const Part> others, float near_m) const {
-    FaceWalls::Reach reach{near_m, 0, 0, 0};
-    for (const Part& other : others)
-        for (const glm::vec3 p : faces_[other.face].corners_m) {
+FaceWalls ChartFaults::wallsOf(const PlanarFace& face, std::span<const Part> others, float near_m) const {
+    const Axes axes(standsOn(face.normal));
+    const glm::vec3 normal = glm::cross(axes.u, axes.v);
+    FaceWalls::Reach reach{near_m, 0, 0, 0, flat_cos};
+    const auto add = [&](const PlanarFace& f) {
+        for (const glm::vec3 p : f.corners_m) {
             const glm::vec3 from = p - face.corners_m[0];
-            const float height_m = glm::dot(face.normal, from);
+            const float height_m = glm::dot(normal, from);
             reach.lowest_m = std::min(reach.lowest_m, height_m);
             reach.highest_m = std::max(reach.highest_m, height_m);
             reach.largest_m = std::max(reach.largest_m, glm::length(from));
         }
-    return reach;
+    };
+    add(face);
+    for (const Part& other : others) add(faces_[other.face]);
+    return {face, axes, reach, standing_};
 }
 
 bool ChartFaults::wasLookedAt(uint32_t a, uint32_t b) const {

@@ -38,9 +38,10 @@ class ChartFaults {
     };
     using Found = std::vector<std::pair<uint32_t, uint32_t>>;
 
+    std::vector<uint32_t> facesOf(const ProjectedChart& chart) const;
     std::vector<Part> partsOf(const JoinedCharts& joined) const;
     Found in(const JoinedCharts& joined) const;
-    FaceWalls::Reach reachOf(const PlanarFace& face, std::span<const Part> others, float near_m) const;
+    FaceWalls wallsOf(const PlanarFace& face, std::span<const Part> others, float near_m) const;
     bool wasLookedAt(uint32_t a, uint32_t b) const;
     bool besideWall(const PlanarFace& a, const PlanarFace& b) const;
     bool stacked(const Part& a, const Part& b, const Axes& axes, float reach_m) const;

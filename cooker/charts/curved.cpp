@@ -16,20 +16,22 @@ namespace {
 
 // Off a chart's normal faces are stored so much coarser along one axis: 0.87 at 30 degrees.
 constexpr float tilt_cos_min = 0.866f;
-// What is shaded as one may bend by 45 degrees at an edge; whatever else by 8, where light is about the same.
-constexpr float smooth_bend_cos_min = 0.707f, bend_cos_min = 0.99f;
-// Less than planes are told apart by (planar.cpp): whatever keeps charts of one plane apart has been seen to there.
-constexpr float one_plane_cos = 1 - 2e-6f;
+// What is shaded as one may bend by 20 degrees at an edge, as a column of 18 sides does; whatever else by 8, where
+// light is about the same.
+constexpr float smooth_bend_cos_min = 0.9396f, bend_cos_min = 0.99f;
 constexpr float same_normal_cos = 0.998f;
 // Edges meet where their ends are in the same place, to a step.
 constexpr float places_per_m = 1024;
-// Of the lesser of two charts, what joining them has to save: with more than 100 texels to a side there is little
-// padding.
-constexpr float saved_min = 0.02f;
+// Of the lesser of two charts, what both as one may take more: others fill the corners. (As with planar ones: without
+// it nearly flat ground stays in two dozen pieces, 1.8 times as large.)
+constexpr float waste_max_of_lesser = 0.3f;
 // Other axes than a plane's own, so that light's directions need not be turned at seams, are to save so much.
 constexpr float turn_saved_min = 0.05f;
 // Joined anew without what was parted. What is still at fault then stays as it was.
 constexpr int rounds_max = 32;
+// Facets of less than a texel are patches of this size before anything is looked for between them: pairs within the
+// filter's reach are too many.
+constexpr float patch_texels = 0.5f;
 
 constexpr size_t direction_count = 26;
 const std::array<glm::vec3, direction_count>& directions() {
@@ -79,15 +81,14 @@ struct Joint {
     glm::vec3 normal, u_axis;
 };
 
+enum class Regions { Join, StayApart };  // what a wall cut apart (wall_cuts.cpp)
+
 class Joiner {
    public:
-    Joiner(std::span<const PlanarFace> faces, const std::vector<ProjectedChart>& charts, uint32_t side_max_texels)
-        : faces_(faces), charts_(charts), side_max_(static_cast<float>(side_max_texels)), beside_(charts.size()) {
+    Joiner(std::span<const PlanarFace> faces, const std::vector<ProjectedChart>& charts, float side_max_texels,
+           Regions regions)
+        : faces_(faces), charts_(charts), side_max_(side_max_texels), regions_(regions), beside_(charts.size()) {
         findSmoothEdges();
-    }
-
-    bool anySmoothEdge() const {
-        return std::ranges::any_of(beside_, [](const auto& beside) { return !beside.empty(); });
     }
 
     std::vector<JoinedCharts> join(const ChartPairs& apart) {
@@ -147,9 +148,10 @@ class Joiner {
                     edges.push_back({a, b, forward, f, c, at_a, at_b});
                 }
         std::ranges::sort(edges, {}, [](const Edge& e) { return std::tie(e.low, e.high, e.face, e.forward); });
+        // Whatever keeps charts of one plane apart has been seen to there (planar.cpp).
         const auto smooth = [&](const Edge& a, const Edge& b) {
             const float bend_cos = glm::dot(faces_[a.face].normal, faces_[b.face].normal);
-            if (bend_cos > one_plane_cos) return false;
+            if (inOnePlane(faces_[a.face], faces_[b.face])) return false;
             return bend_cos > bend_cos_min ||
                    (bend_cos > smooth_bend_cos_min && glm::dot(a.normal_low, b.normal_low) > same_normal_cos &&
                     glm::dot(a.normal_high, b.normal_high) > same_normal_cos);
@@ -174,8 +176,9 @@ class Joiner {
     }
 
     bool mayMeet(uint32_t a, uint32_t b) const {
-        return faces_[charts_[a].faces[0]].group == faces_[charts_[b].faces[0]].group &&
-               charts_[a].texels_per_metre == charts_[b].texels_per_metre;
+        const PlanarFace &face_a = faces_[charts_[a].faces[0]], &face_b = faces_[charts_[b].faces[0]];
+        return face_a.group == face_b.group && charts_[a].texels_per_metre == charts_[b].texels_per_metre &&
+               (regions_ == Regions::Join || face_a.region == face_b.region);
     }
 
     Patch patchOf(uint32_t chart) const {
@@ -204,7 +207,7 @@ class Joiner {
         const auto joint = jointOf(patches_[a], patches_[b], charts_[a].texels_per_metre);
         if (!joint) return;
         const float apart = patches_[a].texels + patches_[b].texels;
-        if (apart - joint->texels < saved_min * std::min(patches_[a].texels, patches_[b].texels)) return;
+        if (joint->texels - apart > waste_max_of_lesser * std::min(patches_[a].texels, patches_[b].texels)) return;
         float tilt_cos = 1;
         for (const Patch* p : {&patches_[a], &patches_[b]})
             for (const glm::vec3 n : p->normals) tilt_cos = std::min(tilt_cos, glm::dot(n, joint->normal));
@@ -257,6 +260,7 @@ class Joiner {
     std::span<const PlanarFace> faces_;
     const std::vector<ProjectedChart>& charts_;
     float side_max_;
+    Regions regions_;
     std::vector<std::set<uint32_t>> beside_;  // per chart: others across smooth edges
     Groups groups_{0};
     std::vector<Patch> patches_;
@@ -279,12 +283,20 @@ ProjectedChart chartOf(std::span<const PlanarFace> faces, const std::vector<Proj
     return chart;
 }
 
+// Charts of facets far below a texel, joined to patches that are still smaller than one.
+std::vector<ProjectedChart> patchesOf(std::span<const PlanarFace> faces, const std::vector<ProjectedChart>& charts) {
+    std::vector<ProjectedChart> patches;
+    for (const JoinedCharts& j : Joiner(faces, charts, patch_texels, Regions::StayApart).join({}))
+        patches.push_back(chartOf(faces, charts, j));
+    return patches;
+}
+
 }  // namespace
 
-std::vector<ProjectedChart> joinCurved(std::span<const PlanarFace> faces, std::vector<ProjectedChart> charts,
+std::vector<ProjectedChart> joinCurved(std::span<const PlanarFace> faces, const std::vector<ProjectedChart>& planar,
                                        uint32_t side_max_texels, const Standing& standing) {
-    Joiner joiner(faces, charts, side_max_texels);
-    if (!joiner.anySmoothEdge()) return charts;
+    const std::vector<ProjectedChart> charts = patchesOf(faces, planar);
+    Joiner joiner(faces, charts, static_cast<float>(side_max_texels), Regions::Join);
     ChartFaults faults(faces, charts, standing);
     ChartPairs apart, last;
     std::vector<JoinedCharts> joined;

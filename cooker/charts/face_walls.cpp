@@ -45,6 +45,8 @@ std::optional<std::vector<Rect>> FaceWalls::shadowsNear(const Standing& standing
                 corners.push_back(axes_.u * u + axes_.v * v + normal * height);
     std::vector<Rect> shadows;
     for (const auto& triangle : standing.triangles(BoxTree::boxOf(corners))) {
+        const glm::vec3 across = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+        if (std::abs(glm::dot(across, normal)) >= reach_.flat_cos * glm::length(across)) continue;
         Rect shadow = shadowBetween(triangle, low, high);
         if (!(shadow.min.x <= shadow.max.x)) continue;
         const glm::vec2 largest = glm::max(glm::abs(shadow.min), glm::abs(shadow.max));
@@ -78,7 +80,7 @@ bool FaceWalls::mayPart(Rect a, const Rect& b) const {
 
 bool FaceWalls::wallBetween(const PlanarFace& a, const PlanarFace& b) const {
     const auto wallAt = [&](glm::vec3 p, glm::vec3 q, float height_m) {
-        const glm::vec3 lift = face_.normal * height_m;
+        const glm::vec3 lift = glm::cross(axes_.u, axes_.v) * height_m;
         return blocked_(p + lift, q + lift) || blocked_(q + lift, p + lift);
     };
     for (size_t e = 0; e < 3; ++e)

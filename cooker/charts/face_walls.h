@@ -23,8 +23,10 @@ class FaceWalls {
     struct Reach {
         float near_m;               // faces further off are not asked for
         float largest_m;            // side of the faces that are
-        float lowest_m, highest_m;  // over the plane of the one, of those faces
+        float lowest_m, highest_m;  // of those faces, over the first corner of the one
+        float flat_cos = 2;         // what faces along the plane's normal by as much is ground itself, and no wall
     };
+    // `axes`: of the plane that walls stand on: the face's own, or level where it slopes.
     FaceWalls(const PlanarFace& face, const Axes& axes, const Reach& reach, const Standing& standing);
 
     // Nothing stands where a wall would.

@@ -28,17 +28,19 @@ constexpr int edge_directions = 360;
 constexpr float waste_max = 1.3f;
 constexpr float waste_free_texels = 16;
 
-using PlaneKey = std::tuple<uint32_t, uint32_t, long, long, long, long, long>;
+// Normal and offset, in steps.
+using Plane = std::array<long, 4>;
+
+Plane planeOf(const PlanarFace& f) {
+    const auto step = [](float value, float steps) { return std::lround(value * steps); };
+    return {step(f.normal.x, normal_steps), step(f.normal.y, normal_steps), step(f.normal.z, normal_steps),
+            step(glm::dot(f.normal, f.corners_m[0]), offset_steps_per_m)};
+}
+
+using PlaneKey = std::tuple<uint32_t, uint32_t, long, Plane>;
 
 PlaneKey planeKey(const PlanarFace& f) {
-    auto step = [](float value, float steps) { return std::lround(value * steps); };
-    return {f.group,
-            f.region,
-            step(f.texels_per_metre, 256),
-            step(f.normal.x, normal_steps),
-            step(f.normal.y, normal_steps),
-            step(f.normal.z, normal_steps),
-            step(glm::dot(f.normal, f.corners_m[0]), offset_steps_per_m)};
+    return {f.group, f.region, std::lround(f.texels_per_metre * 256), planeOf(f)};
 }
 
 struct Contact {
@@ -293,6 +295,10 @@ class PlaneGrouper {
 };
 
 }  // namespace
+
+bool inOnePlane(const PlanarFace& a, const PlanarFace& b) {
+    return planeOf(a) == planeOf(b);
+}
 
 std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
                                          const Standing& standing) {

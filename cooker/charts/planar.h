@@ -47,6 +47,9 @@ struct Standing {
     std::function<std::vector<std::array<glm::vec3, 3>>(const BoxTree::Box&)> triangles;
 };
 
+// As planarCharts() tells planes apart.
+bool inOnePlane(const PlanarFace& a, const PlanarFace& b);
+
 // Deterministic. Cost: near O(n log n) where the boxes of faces in one plane overlap few others; where something stands
 // on them, times those within two texels of it.
 std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,

@@ -18,8 +18,8 @@
 
 #include <fstream>
 #include <map>
-#include <random>
 #include <ostream>
+#include <random>
 
 namespace dimmer::cook::test {
 namespace {
