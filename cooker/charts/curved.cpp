@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <optional>
 #include <queue>
 #include <set>
@@ -95,23 +97,26 @@ class Joiner {
         groups_ = Groups(charts_.size());
         for (const auto& [a, b] : apart) groups_.keepApart(a, b);
         patches_.clear();
-        for (uint32_t c = 0; c < charts_.size(); ++c) patches_.push_back(patchOf(c));
+        patches_.resize(charts_.size());
+        for (uint32_t c = 0; c < charts_.size(); ++c)
+            if (!beside_[c].empty()) patches_[c] = std::make_unique<Patch>(patchOf(c));
         candidates_ = {};
-        for (uint32_t a = 0; a < patches_.size(); ++a)
-            for (const uint32_t b : patches_[a].beside)
+        for (uint32_t a = 0; a < charts_.size(); ++a)
+            for (const uint32_t b : beside_[a])
                 if (a < b) consider(a, b);
         while (!candidates_.empty()) {
             const Candidate c = candidates_.top();
             candidates_.pop();
-            if (groups_.find(c.a) == c.a && groups_.find(c.b) == c.b && patches_[c.a].joins == c.joins_a &&
-                patches_[c.b].joins == c.joins_b)
-                joinPair(c.a, c.b);
+            const auto isAsItWas = [&](uint32_t patch, uint32_t joins) {
+                return patches_[patch] && patches_[patch]->joins == joins;
+            };
+            if (isAsItWas(c.a, c.joins_a) && isAsItWas(c.b, c.joins_b)) joinPair(c.a, c.b);
         }
         std::vector<JoinedCharts> joined(charts_.size(), {{}, Axes({0, 1, 0})});
         for (uint32_t c = 0; c < charts_.size(); ++c) {
             const uint32_t root = groups_.find(c);
-            const Patch& patch = patches_[root];
-            joined[root].axes = Axes(glm::normalize(patch.normal_area), patch.u_axis);
+            if (const auto& patch = patches_[root])
+                joined[root].axes = Axes(glm::normalize(patch->normal_area), patch->u_axis);
             joined[root].charts.push_back(c);
         }
         std::erase_if(joined, [](const JoinedCharts& j) { return j.charts.empty(); });
@@ -119,6 +124,8 @@ class Joiner {
     }
 
    private:
+    using Place = std::array<int32_t, 3>;  // in steps; levels end at 1000 km
+
     struct Candidate {
         float cost;
         uint32_t a, b, joins_a, joins_b;
@@ -128,7 +135,6 @@ class Joiner {
     };
 
     void findSmoothEdges() {
-        using Place = std::array<long, 3>;
         struct Edge {
             Place low, high;
             bool forward;
@@ -170,8 +176,8 @@ class Joiner {
         }
     }
 
-    static std::array<long, 3> placeOf(glm::vec3 p) {
-        const auto step = [](float v) { return std::lround(v * places_per_m); };
+    static Place placeOf(glm::vec3 p) {
+        const auto step = [](float v) { return static_cast<int32_t>(std::lround(v * places_per_m)); };
         return {step(p.x), step(p.y), step(p.z)};
     }
 
@@ -204,14 +210,15 @@ class Joiner {
 
     void consider(uint32_t a, uint32_t b) {
         if (groups_.areApart(a, b)) return;
-        const auto joint = jointOf(patches_[a], patches_[b], charts_[a].texels_per_metre);
+        const Patch &one = *patches_[a], &other = *patches_[b];
+        const auto joint = jointOf(one, other, charts_[a].texels_per_metre);
         if (!joint) return;
-        const float apart = patches_[a].texels + patches_[b].texels;
-        if (joint->texels - apart > waste_max_of_lesser * std::min(patches_[a].texels, patches_[b].texels)) return;
+        const float apart = one.texels + other.texels;
+        if (joint->texels - apart > waste_max_of_lesser * std::min(one.texels, other.texels)) return;
         float tilt_cos = 1;
-        for (const Patch* p : {&patches_[a], &patches_[b]})
+        for (const Patch* p : {&one, &other})
             for (const glm::vec3 n : p->normals) tilt_cos = std::min(tilt_cos, glm::dot(n, joint->normal));
-        candidates_.push({joint->texels / apart * (2 - tilt_cos), a, b, patches_[a].joins, patches_[b].joins});
+        candidates_.push({joint->texels / apart * (2 - tilt_cos), a, b, one.joins, other.joins});
     }
 
     std::optional<Joint> jointOf(const Patch& a, const Patch& b, float density) const {
@@ -238,9 +245,11 @@ class Joiner {
     }
 
     void joinPair(uint32_t a, uint32_t b) {
-        const auto joint = jointOf(patches_[a], patches_[b], charts_[a].texels_per_metre);
+        const auto joint = jointOf(*patches_[a], *patches_[b], charts_[a].texels_per_metre);
         const auto [whole, part] = groups_.join(a, b);
-        Patch &to = patches_[whole], &from = patches_[part];
+        const Patch from = std::move(*patches_[part]);
+        patches_[part].reset();
+        Patch& to = *patches_[whole];
         to.normal_area += from.normal_area;
         to.corners_m.add(from.corners_m);
         to.normals.add(from.normals);
@@ -248,12 +257,11 @@ class Joiner {
         to.texels = joint->texels;
         ++to.joins;
         for (const uint32_t other : from.beside) {
-            patches_[other].beside.erase(part);
+            patches_[other]->beside.erase(part);
             if (other == whole) continue;
-            patches_[other].beside.insert(whole);
+            patches_[other]->beside.insert(whole);
             to.beside.insert(other);
         }
-        from.beside.clear();
         for (const uint32_t other : to.beside) consider(std::min(whole, other), std::max(whole, other));
     }
 
@@ -263,7 +271,7 @@ class Joiner {
     Regions regions_;
     std::vector<std::set<uint32_t>> beside_;  // per chart: others across smooth edges
     Groups groups_{0};
-    std::vector<Patch> patches_;
+    std::vector<std::unique_ptr<Patch>> patches_;  // of charts beside others, until they are another one's part
     std::priority_queue<Candidate> candidates_;
 };
 
