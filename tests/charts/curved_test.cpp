@@ -155,7 +155,7 @@ TEST(CurvedCharts, FacetsOfAGentleCurveAreOne) {
 TEST(CurvedCharts, NothingLiesOverItself) {
     const Shape ramp = [](float s, float t) {
         const float angle = t * glm::radians(15.0f);
-        return glm::vec3((2 + s) * std::cos(angle), 0.4f * angle, (2 + s) * std::sin(angle));
+        return glm::vec3((0.5f + 0.5f * s) * std::cos(angle), 0.12f * angle, (0.5f + 0.5f * s) * std::sin(angle));
     };
     std::vector<PlanarFace> faces = facesOf(meshOf(ramp, 2, 48, 0));
     for (PlanarFace& f : faces)
@@ -167,7 +167,7 @@ TEST(CurvedCharts, NothingLiesOverItself) {
         }
     const auto charts = chartsOf(faces);
     expectChartsOfAll(faces, charts);
-    EXPECT_LT(charts.size(), 24u);
+    EXPECT_LE(charts.size(), 6u);
     constexpr float cells_per_m = 16;
     for (const ProjectedChart& chart : charts) {
         std::map<std::pair<uint32_t, uint32_t>, float> height_m;
