@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 
 namespace dimmer::cook {
 namespace {
@@ -92,6 +93,10 @@ std::string unknownKey(const std::string& key, const json& value, const std::vec
     const auto turned = std::ranges::find(known, sortedWords(key), [](std::string_view k) { return sortedWords(k); });
     if (turned != known.end()) nearest = *turned;
     if (!nearest.empty()) return fmt::format("'{}' is no setting; did you mean '{}'?", key, nearest);
+    if (key == "quality") return "'quality' is no setting but an option: --quality draft, preview or final";
+    std::vector<std::string_view> ends;  // "page_size" for "lightmaps.page_size"
+    std::ranges::copy_if(known, std::back_inserter(ends), [&](std::string_view k) { return k.ends_with("." + key); });
+    if (!ends.empty()) return fmt::format("'{}' is no setting; did you mean '{}'?", key, fmt::join(ends, "' or '"));
     return fmt::format("'{}' is no setting; there are: {}", key, fmt::join(known, ", "));
 }
 

@@ -133,6 +133,7 @@ Expected<double> keepLit(const RayScene& rays, const Pack& pack, uint32_t seed, 
     const auto packed = packLight(pack, points, false, "");
     if (!packed) return std::unexpected(packed.error());
     std::vector<VerifyPoint> lit;
+    const size_t asked = points.size();
     double sum = 0;
     for (size_t i = 0; i < points.size(); ++i) {
         const auto lux = static_cast<double>(luminance(all_on[i].value().irradiance_lux));
@@ -142,7 +143,9 @@ Expected<double> keepLit(const RayScene& rays, const Pack& pack, uint32_t seed, 
     points = std::move(lit);
     if (sum > 0) return floor_share * sum / static_cast<double>(points.size());
     return fail(ErrorCode::BadInput,
-                "With all light sets on, the level is black: there is nothing to measure an error against.");
+                fmt::format("With all light sets on, no light was found at {} points: there is nothing to measure an "
+                            "error against. Is the level lit, and are those points enough (--points)?",
+                            asked));
 }
 
 Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {

@@ -89,6 +89,10 @@ TEST(Profile, UnknownKeysAreNamedWithTheNearest) {
     expectBad("{\"records\": {\"threshold\": 0.1,\n\"threshold\": 0.2}}", {":2: 'records.threshold' is there twice"});
     expectBad("{\"records.threshold\": 0.1,\n\"records\": {\n\"threshold\": 0.2}}",
               {":3: 'records.threshold' is there twice"});
+    expectBad(R"({"texels_per_metre": 4})", {"did you mean 'lightmaps.texels_per_metre'?"});
+    expectBad(R"({"bounces": 4})",
+              {"did you mean 'bake.draft.bounces' or 'bake.preview.bounces' or 'bake.final.bounces'?"});
+    expectBad(R"({"quality": "final"})", {"an option: --quality"});
     expectBad("{\n\"bugdets\": {}}", {":2: 'bugdets' is no setting"});
     expectBad(R"({"kernels": {}})", {"'kernels' is no setting"});
     expectBad("{\n\"extends\": \"no such\"}", {":2: ", "'extends'", "no such"});
