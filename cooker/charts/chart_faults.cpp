@@ -17,7 +17,7 @@ constexpr float detour_max = 1.5f;
 // Between the middles of two faces that a wall cut it stands at least as high.
 constexpr float cut_wall_m = 0.3f;
 constexpr float about_one_plane_cos = 0.998f;
-// Slopes of up to 60 degrees are ground; what leans more than 53 on them is a wall.
+// Slopes of up to 60 degrees are ground; what is steeper than 37 on them may be a wall.
 constexpr float ground_cos_min = 0.5f, flat_cos = 0.8f;
 
 // The normal of the plane that walls stand on: plumb where it is ground, or a ceiling, however that slopes.
