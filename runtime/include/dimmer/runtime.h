@@ -117,9 +117,9 @@ class Runtime : public LightState {
     // Uploads the pack's records and the base pages (blocking). Device memory: footprint().
     // InvalidArgument: a null handle (only compute_queue and pipeline_cache may be), a queue family that is not there,
     // or one without compute; options out of their range. OutOfMemory: of the device's or the host's, or
-    // records_bytes_max is too little. Unsupported: a device below Vulkan 1.2, or without a
-    // format or limit that the pack needs; a loader without a function of Vulkan 1.2, or another one than a runtime has
-    // that lives. Whether timelineSemaphore is enabled, and the queues are of these families, it cannot see.
+    // records_bytes_max is too little. Unsupported: a device below Vulkan 1.2, or without a format or limit that the
+    // pack needs; a loader without a function of Vulkan 1.2, or another one than a runtime has that lives. Whether
+    // timelineSemaphore is enabled, and the queues are of these families, it cannot see.
     static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
     // Waits for what submit() and continueLoading() sent, and for nothing else. Of the caller's submissions those must
     // have completed before that have a record()ed update in them, read pages, probes or gridTable(), or wait for
