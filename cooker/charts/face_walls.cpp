@@ -1,6 +1,7 @@
 #include <charts/face_walls.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace dimmer::cook {
@@ -21,7 +22,7 @@ FaceWalls::FaceWalls(const PlanarFace& face, const Axes& axes, const Reach& reac
     : face_(face),
       axes_(axes),
       reach_(reach),
-      blocked_(standing.blocked),
+      standing_(standing),
       shadows_(standing.triangles ? shadowsNear(standing) : std::nullopt) {}
 
 bool FaceWalls::partFrom(const PlanarFace& other) const {
@@ -79,10 +80,6 @@ bool FaceWalls::mayPart(Rect a, const Rect& b) const {
 }
 
 bool FaceWalls::wallBetween(const PlanarFace& a, const PlanarFace& b) const {
-    const auto wallAt = [&](glm::vec3 p, glm::vec3 q, float height_m) {
-        const glm::vec3 lift = glm::cross(axes_.u, axes_.v) * height_m;
-        return blocked_(p + lift, q + lift) || blocked_(q + lift, p + lift);
-    };
     for (size_t e = 0; e < 3; ++e)
         for (const float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
             glm::vec3 p = glm::mix(a.corners_m[e], a.corners_m[(e + 1) % 3], s);
@@ -94,9 +91,31 @@ bool FaceWalls::wallBetween(const PlanarFace& a, const PlanarFace& b) const {
             q += step_in * (middleOf(b) - q);
             const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
             if (!mayPart({on_p, on_p}, {on_q, on_q})) continue;
-            if (wallAt(p, q, wall_probe_low_m) && wallAt(p, q, wall_probe_high_m)) return true;
+            if (wallBetween(p, q) && wallBetween(outOfWalls(p, a), outOfWalls(q, b))) return true;
         }
     return false;
+}
+
+bool FaceWalls::wallBetween(glm::vec3 p, glm::vec3 q) const {
+    return std::ranges::all_of(std::array{wall_probe_low_m, wall_probe_high_m}, [&](float height_m) {
+        const glm::vec3 from = p + lift(height_m), to = q + lift(height_m);
+        return standing_.blocked(from, to) || standing_.blocked(to, from);
+    });
+}
+
+// A face goes on to the middle of the wall that it was cut at: what is in there sees nothing of its own room. The first
+// place on the way to the face's middle that is in the open, if there is one.
+glm::vec3 FaceWalls::outOfWalls(glm::vec3 p, const PlanarFace& face) const {
+    if (!standing_.inside) return p;
+    for (const float share : {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f}) {
+        const glm::vec3 at = glm::mix(p, middleOf(face), share);
+        if (!standing_.inside(at + lift(wall_probe_low_m), axes_)) return at;
+    }
+    return p;
+}
+
+glm::vec3 FaceWalls::lift(float height_m) const {
+    return glm::cross(axes_.u, axes_.v) * height_m;
 }
 
 glm::vec3 middleOf(const PlanarFace& face) {

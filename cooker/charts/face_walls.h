@@ -38,11 +38,14 @@ class FaceWalls {
     Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, float low, float high) const;
     bool mayPart(Rect a, const Rect& b) const;
     bool wallBetween(const PlanarFace& a, const PlanarFace& b) const;
+    bool wallBetween(glm::vec3 p, glm::vec3 q) const;
+    glm::vec3 outOfWalls(glm::vec3 p, const PlanarFace& face) const;
+    glm::vec3 lift(float height_m) const;
 
     const PlanarFace& face_;
     Axes axes_;
     Reach reach_;
-    const std::function<bool(glm::vec3, glm::vec3)>& blocked_;
+    const Standing& standing_;
     // Of all that stands as high as a wall, where it is in the plane; nothing: there are too many.
     std::optional<std::vector<Rect>> shadows_;
 };

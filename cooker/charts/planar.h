@@ -38,6 +38,8 @@ inline uint32_t chartGroup(const SceneMesh& mesh) {
     return mesh.door ? 2 * *mesh.door + mesh.is_open_leaf + 1 : 0;
 }
 
+struct Axes;
+
 // What stands on a level's planes; asked on all threads.
 struct Standing {
     // Something opaque is on the straight line between two points. Empty: nothing is.
@@ -45,6 +47,9 @@ struct Standing {
     // Triangles, among them all opaque ones that touch a box: where there are none, `blocked` is not asked. Empty:
     // there may be some anywhere.
     std::function<std::vector<std::array<glm::vec3, 3>>(const BoxTree::Box&)> triangles;
+    // A point lies within what is solid, of which a wall that parts charts in its middle leaves half to each. Empty:
+    // none does.
+    std::function<bool(glm::vec3, const Axes&)> inside = {};
 };
 
 // As planarCharts() tells planes apart.

@@ -17,7 +17,8 @@ namespace {
 constexpr float reach_texels = 2.5f;   // thinner than this leaks: bilinear filtering plus half a texel of averaging
 constexpr float doorway_min_m = 0.5f;  // narrower ones are gaps between a shelf's boards
 constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0.9f;
-constexpr float lean_max = 1.75f;  // what leans more is a roof
+constexpr float lean_max = 1.75f;      // what leans more is a roof
+constexpr float slope_cos_min = 0.5f;  // and what slopes more no ground
 // A trace need not be quite straight along the axis, over so much of its length and of a texel.
 constexpr float skew_share = 0.02f, skew_texels = 0.25f, skew_max_m = 0.1f;
 constexpr float same_slope = 1e-3f;
@@ -287,11 +288,17 @@ glm::vec3 StandingWalls::onPlane(const ProjectedChart& chart, glm::vec2 at, floa
     return p + up * ((height - glm::dot(any.normal, p)) / glm::dot(any.normal, up));
 }
 
-// What holds every trace that counts at a height over a chart's rectangle.
+// What holds every trace that counts at a height over a chart's rectangle, over slopes plumb as well: what stands
+// there is on no small facet's rectangle any more.
 BoxTree::Box StandingWalls::boxOver(const ProjectedChart& chart, float height_m) const {
-    std::array<glm::vec3, 4> corners;
-    for (uint32_t i = 0; i < 4; ++i)
+    const glm::vec3 normal = faces_[chart.faces[0]].normal;
+    const bool slopes = std::abs(normal.y) > slope_cos_min;
+    const glm::vec3 plumb = slopes ? glm::vec3(0, height_m / normal.y, 0) - height_m * normal : glm::vec3(0);
+    std::array<glm::vec3, 8> corners;
+    for (uint32_t i = 0; i < 4; ++i) {
         corners[i] = onPlane(chart, chart.min_m + chart.size_m * glm::vec2(i & 1, i >> 1), height_m);
+        corners[i + 4] = corners[i] + plumb;
+    }
     BoxTree::Box box = BoxTree::boxOf(corners);
     const float reach_m =
         wall_margin_m + same_line_m + rounding_share * std::max({largest_m_, largest(box.min_m), largest(box.max_m)});
@@ -341,8 +348,9 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const ProjectedChart
             const float lean = -rise / normal[axis];
             if (!(std::abs(lean) < lean_max)) continue;
             const float at = 0.5f * (a[axis] + b[axis]), from = std::max(low[along], std::min(a[along], b[along])),
-                        to = std::min(high[along], std::max(a[along], b[along]));
-            if (to - from < same_line_m || at < low[axis] - wall_margin_m || at > high[axis] + wall_margin_m) continue;
+                        to = std::min(high[along], std::max(a[along], b[along])), foot = at - lean * height_m;
+            if (to - from < same_line_m || foot < low[axis] - wall_margin_m || foot > high[axis] + wall_margin_m)
+                continue;
             const bool forward = normal[axis] > 0;
             Trace trace{{axis, at, from, to}, forward, double_sided, lean};
             const bool long_enough = std::abs(a[along] - b[along]) > same_line_m;
@@ -433,7 +441,8 @@ StandingWalls::Met StandingWalls::meets(glm::vec3 from, glm::vec3 direction) con
     }
     constexpr float none = std::numeric_limits<float>::max();
     float face_m = none, back_m = none;
-    for (float step_m = first_step_m; std::min(face_m, back_m) == none && step_m < 2 * end_m; step_m *= 2) {
+    for (float step_m = first_step_m, done_m = 0; std::min(face_m, back_m) == none && done_m < end_m; step_m *= 2) {
+        done_m = step_m;
         BoxTree::Box box = BoxTree::boxOf(std::array{from, from + std::min(step_m, end_m) * direction});
         box.min_m -= same_line_m, box.max_m += same_line_m;
         for (const uint32_t near : boxes_.touching(box)) {

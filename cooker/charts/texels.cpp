@@ -22,6 +22,8 @@ constexpr float lift_m = 5e-4f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
+// With as many backs among them: in a wall, perhaps, over ground that goes on through it.
+constexpr uint32_t doubtful_backs_min = 4;
 // There is air where ten of the rays along a surface, nearly, get so far without meeting a back.
 constexpr uint32_t horizon_rays = 16, horizon_open_min = 10;
 constexpr float horizon_sine = 0.1f, horizon_open_m = 1;
@@ -127,6 +129,10 @@ class TexelSampler {
             centroid = {c.face, steps.x, steps.y};
         }
         if (usable.tried == 0 && largest > 0) tryPoint(corner, centroid, usable, result);
+        if (usable.dropped > result.points.size())
+            std::erase_if(result.points, [&](const TexelPoint& p) {
+                return std::ranges::find(usable.doubtful, p) != usable.doubtful.end();
+            });
         // All of it lies in a closed door's leaf: what an opening uncovers.
         if (result.points.empty()) result.points = std::move(usable.in_leaf);
         // Few points may all lie in holes of what rays do hit.
@@ -134,7 +140,8 @@ class TexelSampler {
             for (const glm::u16vec2 within : tries_)
                 if (const auto at = surfaceAt(faces, corner, within)) addReflectance(corner, *at, usable, result);
         if (usable.alpha > 0) result.reflectance /= usable.alpha;
-        if (usable.dropped > 0 && result.points.size() > 1) keepOneSideOfWalls(corner, result.points);
+        if ((usable.dropped > 0 || !usable.doubtful.empty()) && result.points.size() > 1)
+            keepOneSideOfWalls(corner, result.points);
         if (!result.points.empty()) result.place_m = positionM(corner, result.points[0]);
         return result;
     }
@@ -159,9 +166,13 @@ class TexelSampler {
 
     struct Usable {
         uint32_t tried = 0, dropped = 0;
-        float alpha = 0;                  // sum over what the reflectance was added up over
-        std::vector<TexelPoint> in_leaf;  // of the dropped ones
+        float alpha = 0;                   // sum over what the reflectance was added up over
+        std::vector<TexelPoint> in_leaf;   // of the dropped ones
+        std::vector<TexelPoint> doubtful;  // of the others: where most are dropped they are, too
     };
+
+    // Of what is solid.
+    enum class Side { Out, Doubtful, In };
 
     void tryPoint(glm::uvec2 texel, const TexelPoint& p, Usable& usable, Result& result) const {
         const uint32_t triangle = unwrap_.faces[p.face].triangle;
@@ -169,14 +180,16 @@ class TexelSampler {
         addReflectance(texel, p, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
-        if (!insideGeometry({position, p.face}, Surfaces::All, nearest)) {
+        const Side side = sideOf({position, p.face}, Surfaces::All, nearest);
+        if (side == Side::Doubtful) usable.doubtful.push_back(p);
+        if (side != Side::In) {
             result.points.push_back(p);
             return;
         }
         ++usable.dropped;
         const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
         if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ &&
-            !insideGeometry({position, p.face}, Surfaces::Walls, stays))
+            sideOf({position, p.face}, Surfaces::Walls, stays) != Side::In)
             usable.in_leaf.push_back(p);
     }
 
@@ -205,7 +218,7 @@ class TexelSampler {
     // A point in a closed solid sees its back faces wherever it looks. A few rays decide the common case that it sees
     // none. Where solids touch, the one's back and the other's front are in one place, as where rooms without walls'
     // thickness do: that tells neither, and where most is so, rays along the surface tell more.
-    bool insideGeometry(const SamplePoint& at, Surfaces surfaces, auto&& nearest) const {
+    Side sideOf(const SamplePoint& at, Surfaces surfaces, auto&& nearest) const {
         const TangentFrame& f = unwrap_.frames[at.face];
         uint32_t backs = 0, told = 0;
         const auto look = [&](glm::vec3 direction) {
@@ -215,13 +228,14 @@ class TexelSampler {
             told += back || !hit || !rays_.liesOnBack(*hit, at.position_m, direction, surfaces);
         };
         for (uint32_t i = 0; i < inside_test_rays; ++i) {
-            if (i == inside_test_rays / 4 && backs == 0 && told == i) return false;
+            if (i == inside_test_rays / 4 && backs == 0 && told == i) return Side::Out;
             const glm::vec3 d = cosineDirection(sequence2d(i, at.face));
             look(f.tangent * d.x + f.bitangent * d.y + f.normal * d.z);
         }
         if (told < inside_test_rays / 2)
             for (uint32_t i = 0; i < horizon_rays; ++i) look(alongSurface(f, i));
-        return 2 * backs > told && !openAround(f, nearest);
+        if (2 * backs > told) return openAround(f, nearest) ? Side::Out : Side::In;
+        return backs >= doubtful_backs_min ? Side::Doubtful : Side::Out;
     }
 
     static glm::vec3 alongSurface(const TangentFrame& f, uint32_t i) {

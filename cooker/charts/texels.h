@@ -20,6 +20,8 @@ struct TexelPoint {
 
     uint32_t face = 0;
     uint16_t x = 0, y = 0;  // within the texel, in steps
+
+    bool operator==(const TexelPoint&) const = default;
 };
 
 // A texel that holds a copy of another one: padding around charts, and texels that no light can reach.

@@ -1,5 +1,6 @@
 #include <charts/unwrap.h>
 
+#include <charts/axes.h>
 #include <charts/curved.h>
 #include <charts/file_uv.h>
 #include <charts/pages.h>
@@ -244,6 +245,13 @@ std::vector<Placed> makeCharts(const RayScene& rays, const UnwrapOptions& option
     const BoxTree triangles = boxesOf(rays);
     Standing standing;
     standing.blocked = [&](glm::vec3 a, glm::vec3 b) { return rays.blocked(a, b); };
+    standing.inside = [&](glm::vec3 p, const Axes& axes) {
+        const auto meetsBack = [&](glm::vec3 direction) {
+            const auto hit = rays.nearest(p, direction, far_away_m, 0);
+            return hit && hit->back && !scene.materials[rays.triangles()[hit->triangle].material].double_sided;
+        };
+        return (meetsBack(axes.u) && meetsBack(-axes.u)) || (meetsBack(axes.v) && meetsBack(-axes.v));
+    };
     standing.triangles = [&](const BoxTree::Box& box) {
         std::vector<std::array<glm::vec3, 3>> found;
         for (const uint32_t t : triangles.touching(box)) found.push_back(corners(rays, {t, false}));
