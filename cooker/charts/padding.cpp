@@ -2,6 +2,7 @@
 
 #include <charts/planar.h>
 #include <charts/raster.h>
+#include <charts/smooth_seams.h>
 #include <pack/pack_data.h>
 
 #include <tbb/parallel_for.h>
@@ -9,6 +10,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/gtx/quaternion.hpp>
 
 namespace dimmer::cook {
 namespace {
@@ -20,16 +23,24 @@ constexpr float same_plane_m = 2e-3f;
 constexpr float same_direction = 0.999f;
 // Of a surface that curves: within so many texels of the plane that is continued from its edge.
 constexpr float bend_max = 0.25f;
+// And beyond an edge that is shaded as none.
+constexpr float seam_bend_max = 0.6f;
 
 bool sameToTheEye(const TangentFrame& a, const TangentFrame& b) {
     return glm::dot(a.normal, b.normal) >= same_direction && glm::dot(a.tangent, b.tangent) >= same_direction &&
            glm::dot(a.bitangent, b.bitangent) >= same_direction;
 }
 
+// As the frame lies where its surface is bent back into the plane of another one.
+TangentFrame unbent(const TangentFrame& frame, glm::vec3 normal) {
+    const glm::quat turn = glm::rotation(frame.normal, normal);
+    return {turn * frame.tangent, turn * frame.bitangent, normal};
+}
+
 class Padding {
    public:
     Padding(const RayScene& rays, const Unwrap& unwrap, const std::vector<uint8_t>& covered, Texels& texels)
-        : rays_(rays), unwrap_(unwrap), covered_(covered), texels_(texels) {}
+        : rays_(rays), unwrap_(unwrap), covered_(covered), texels_(texels), smooth_(rays, unwrap) {}
 
     void fill() {
         std::vector<uint32_t> chart_of_fill;
@@ -87,27 +98,48 @@ class Padding {
 
     // The receiver of another chart of the same surface that lies under the fill's centre; no_index when there is none.
     uint32_t acrossSeam(const FillTexel& fill, uint32_t chart) const {
+        const uint32_t own_face = texels_.face(fill.source);
+        const TangentFrame& frame = unwrap_.frames[own_face];
+        const float texel_m = std::sqrt(unwrap_.texel_area_m2[own_face]);
+        const bool curved = unwrap_.charts[chart].curved;
+        const uint32_t found =
+            below(fill, chart, curved ? bend_max * texel_m : same_plane_m, [&](uint32_t face) {
+                const TangentFrame& other = unwrap_.frames[face];
+                return curved ? sameFrame(other, frame) : sameToTheEye(other, frame);
+            });
+        if (found != no_index || !smooth_.any(chart)) return found;
+        return below(fill, chart, seam_bend_max * texel_m, [&](uint32_t face) {
+            return smooth_.meet(chart, unwrap_.face_chart[face]) &&
+                   sameFrame(unbent(unwrap_.frames[face], frame.normal), frame);
+        });
+    }
+
+    // Within so many metres of the plane that its source's face is in, on a face of another chart that is as wanted.
+    uint32_t below(const FillTexel& fill, uint32_t chart, float off_plane_m, auto&& wanted) const {
         const SamplePoint own = samplePoint(rays_, unwrap_, texels_, fill.source, 0);
-        const Face face = unwrap_.faces[own.face];
-        const TangentFrame& frame = unwrap_.frames[own.face];
+        const glm::vec3 normal = unwrap_.frames[own.face].normal;
         const glm::vec3 centre =
             positionAt(own.face, glm::vec2(TexelAddress::x(fill.address) + 0.5f, TexelAddress::y(fill.address) + 0.5f));
-        const bool curved = unwrap_.charts[chart].curved;
-        const float off_plane_m = curved ? bend_max * std::sqrt(unwrap_.texel_area_m2[own.face]) : same_plane_m;
-        const auto hit = rays_.nearest(centre + frame.normal * off_plane_m, -frame.normal, 2 * off_plane_m, 0);
-        if (!hit || hit->back != face.back) return no_index;
-        const uint32_t other_face = unwrap_.faceOf(hit->triangle, hit->back);
-        if (other_face == no_index || unwrap_.face_chart[other_face] == chart) return no_index;
-        const TangentFrame& other = unwrap_.frames[other_face];
-        if (!(curved ? sameFrame(other, frame) : sameToTheEye(other, frame))) return no_index;
+        const auto hit = rays_.nearest(centre + normal * off_plane_m, -normal, 2 * off_plane_m, 0);
+        if (!hit || hit->back != unwrap_.faces[own.face].back) return no_index;
+        const uint32_t face = unwrap_.faceOf(hit->triangle, hit->back);
+        if (face == no_index || unwrap_.face_chart[face] == chart || !wanted(face)) return no_index;
         const uint32_t found = receiverOf(unwrap_, texels_, *hit);
-        if (found == no_index || found == fill.source) return no_index;
-        const glm::vec3 from = own.position_m, to = samplePoint(rays_, unwrap_, texels_, found, 0).position_m;
-        for (const float height_m : {wall_probe_low_m, leaf_probe_low_m}) {
-            const glm::vec3 lift = frame.normal * height_m;
-            if (rays_.blocked(from + lift, to + lift) || rays_.blocked(to + lift, from + lift)) return no_index;
+        return found == no_index || found == fill.source || parted(own, found) ? no_index : found;
+    }
+
+    // By a wall. Over what is round as high as the way along it is long, half of it: clear of its crest.
+    bool parted(const SamplePoint& own, uint32_t receiver) const {
+        const SamplePoint other = samplePoint(rays_, unwrap_, texels_, receiver, 0);
+        const glm::vec3 normal = unwrap_.frames[own.face].normal, other_normal = unwrap_.frames[other.face].normal;
+        const bool flat = glm::dot(normal, other_normal) > same_direction;
+        const float round_m = std::max(leaf_probe_low_m, 0.5f * glm::length(other.position_m - own.position_m));
+        for (const float height_m : {flat ? wall_probe_low_m : round_m, flat ? leaf_probe_low_m : round_m}) {
+            const glm::vec3 from = own.position_m + normal * height_m,
+                            to = other.position_m + (flat ? normal : other_normal) * height_m;
+            if (rays_.blocked(from, to) || rays_.blocked(to, from)) return true;
         }
-        return found;
+        return false;
     }
 
     // The plane of a face, continued to any place of the page.
@@ -123,6 +155,7 @@ class Padding {
     const Unwrap& unwrap_;
     const std::vector<uint8_t>& covered_;
     Texels& texels_;
+    SmoothSeams smooth_;
 };
 
 }  // namespace

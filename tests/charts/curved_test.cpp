@@ -11,6 +11,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <random>
 #include <set>
 #include <span>
@@ -272,6 +273,47 @@ TEST(CurvedCharts, DoNotMixGroupsOrDensities) {
             EXPECT_EQ(faces[f].group, faces[chart.faces[0]].group);
             EXPECT_EQ(faces[f].texels_per_metre, chart.texels_per_metre);
         }
+}
+
+// A column of 20 sides is several charts, of about two texels across. Where they meet both hold the same two texels;
+// clamped to its own, each would end with the mean of facets some 40 degrees from the other's: a third of far light.
+TEST(CurvedCharts, LightGoesOnAroundAColumn) {
+    constexpr float radius_m = 0.3f, far_lux = 1000;
+    constexpr uint32_t sides = 20;
+    const auto at = [](float side, float height_m, float out) {
+        const float angle = side * 2 * std::numbers::pi_v<float> / sides;
+        return glm::vec3(out * std::cos(angle), height_m, out * std::sin(angle));
+    };
+    Scene scene;
+    scene.meshes.push_back(meshOf([&](float s, float t) { return at(std::fmod(s, sides), t, radius_m); }, sides, 2,
+                                  addMaterial(scene, lambert(0))));
+    for (size_t i = 0; i < scene.meshes[0].normals.size(); ++i)
+        scene.meshes[0].normals[i] =
+            glm::normalize(scene.meshes[0].positions_m[i] * glm::vec3(1, 0, 1));
+    PunctualLight sun;
+    sun.node = "sun";
+    sun.type = LightType::Directional;
+    sun.direction = glm::normalize(glm::vec3(1, 0, 0.2f));
+    sun.intensity = glm::vec3(far_lux);
+    sun.bake = BakeMode::Full;
+    scene.lights.push_back(sun);
+    const auto pack = cooked(scene, "draft");
+    ASSERT_TRUE(pack);
+    std::vector<QueryPoint> points;
+    for (uint32_t side = 0; side < sides; ++side)
+        for (const float off : {-0.02f, 0.02f}) {  // 2 mm from the edge
+            const float k = static_cast<float>(side);
+            const glm::vec3 edge = at(k, 0.9f, radius_m), next = at(off < 0 ? k - 1 : k + 1, 0.9f, radius_m);
+            points.push_back({glm::mix(edge, next, std::abs(off)), at(k + (off < 0 ? -0.5f : 0.5f), 0, 1)});
+        }
+    const auto light = sampled(*pack, points, "");
+    double brightest = 0;
+    for (size_t i = 0; i < light.size(); i += 2) {
+        // A texel is 2.7 facets, over which far light changes by at most 0.77 of it: 4 mm of 250 by 0.01.
+        EXPECT_NEAR(light[i].x, light[i + 1].x, 0.03 * far_lux) << i / 2;
+        brightest = std::max(brightest, light[i].x);
+    }
+    EXPECT_GT(brightest, 0.8 * far_lux);
 }
 
 // Far light on a dome: E0 cos, of which facets that differ by 5 degrees from the curve are off by 0.09 E0 where light
