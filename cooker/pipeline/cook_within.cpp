@@ -21,7 +21,7 @@ std::string waysOut(const std::vector<Remedy>& found) {
     if (found.empty()) return "; no setting would mend it";
     std::string text = found[0].fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
     for (const Remedy& remedy : std::span(found).first(std::min<size_t>(found.size(), remedies_named)))
-        text += "\n  " + remedy.text() + (found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
+        text += "\n  " + remedy.text(found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
     return text;
 }
 
