@@ -142,17 +142,17 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
         if (auto ok = writePack(options, *bytes, cache ? &*cache : nullptr, result.stats.warnings); !ok)
             return std::unexpected(ok.error());
     }
-    result.stats.peak_bytes = peakBytes();
     return {};
 }
 
 }  // namespace
 
-Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings) {
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, CookResult* failed) {
     CookResult result;
     auto ok = cookInto(result, options, progress);
+    result.stats.peak_bytes = peakBytes();
     if (ok) return result;
-    if (warnings) *warnings = std::move(result.stats.warnings);
+    if (failed) *failed = std::move(result);
     return std::unexpected(ok.error());
 }
 

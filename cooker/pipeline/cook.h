@@ -54,15 +54,16 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
 
 struct CookResult {
     PackData pack;
-    Profile profile;             // as resolved, and fitted
-    std::vector<Remedy> fitted;  // what had to be changed, in the order of the cooks that it took
-    bool grid_wanted = false;    // the global one, by profile and level
+    Profile profile;               // as resolved, and fitted
+    std::vector<Remedy> fitted;    // what had to be changed, in the order of the cooks that it took
+    std::vector<Remedy> remedies;  // over budget: ways out
+    bool grid_wanted = false;      // the global one, by profile and level
     uint64_t file_bytes = 0;
     CookStats stats;
 };
 
-// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written; `warnings`, if given,
-// takes what was to be said until then.
-Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings = nullptr);
+// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written; `failed`, if given,
+// takes what there was until then: warnings at least, over budget all but the file.
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, CookResult* failed = nullptr);
 
 }  // namespace dimmer::cook

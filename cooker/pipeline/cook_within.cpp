@@ -53,21 +53,17 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         const PackCost cost = costOf(*pack);
         const auto within = checkBudgets(*pack, cost, result.profile);
         if (within) return pack;
-        if (!fit || round + 1 == fit_rounds_max) {
-            return fail(ErrorCode::OverBudget, within.error().message +
-                                                   waysOut(remedies(*pack, cost, result.profile, losses)) +
-                                                   changedBefore(result.fitted));
-        }
+        const auto overBudget = [&](const std::string& why) {
+            result.remedies = remedies(*pack, cost, result.profile, losses);
+            result.pack = std::move(*pack);
+            return fail(ErrorCode::OverBudget,
+                        within.error().message + why + waysOut(result.remedies) + changedBefore(result.fitted));
+        };
+        if (!fit || round + 1 == fit_rounds_max) return overBudget("");
         const auto density_steps =
             std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
-        if (remedy.changes.empty()) {
-            const auto found = remedies(*pack, cost, result.profile, losses);
-            const char* why = found.empty() ? "; nothing that --fit changes would help"
-                                            : "; all that --fit changes would not be enough";
-            return fail(ErrorCode::OverBudget,
-                        within.error().message + why + waysOut(found) + changedBefore(result.fitted));
-        }
+        if (remedy.changes.empty()) return overBudget("; all that --fit changes would not be enough");
         if (auto ok = applyRemedy(remedy, result.profile); !ok) return std::unexpected(ok.error());
         result.fitted.push_back(std::move(remedy));
     }

@@ -6,7 +6,8 @@
 namespace dimmer::cook {
 
 // Cooks by result.profile, and with `fit` changes that and cooks again until the pack is within its budgets; what was
-// changed goes into result.fitted. An error of ErrorCode::OverBudget names the ways out.
+// changed goes into result.fitted. An error of ErrorCode::OverBudget names the ways out; result.remedies has them, and
+// result.pack is what was too large.
 Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
                               CookCache* cache, CookResult& result);
 
