@@ -16,12 +16,23 @@ constexpr size_t remedies_named = 3;
 // Each round of `--fit` cooks anew: more than a few mean that something does not follow its prediction.
 constexpr int fit_rounds_max = 6;
 
-// Those that are enough come first, so that a first one that is not tells of all.
+// Those that are enough come first, so that a first one that is not tells of all: then one of each kind is named.
 std::string waysOut(const std::vector<Remedy>& found) {
-    if (found.empty()) return "; no setting would mend it";
-    std::string text = found[0].fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
-    for (const Remedy& remedy : std::span(found).first(std::min<size_t>(found.size(), remedies_named)))
-        text += "\n  " + remedy.text(found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
+    if (found.empty()) return "; none of the settings that were tried mends it";
+    const bool fits = found[0].fits;
+    std::string text = fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
+    const std::vector<Remedy> named = fits ? found : bestOfEachKind(found);
+    for (const Remedy& remedy : std::span(named).first(fits ? std::min(named.size(), remedies_named) : named.size()))
+        text += "\n  " + remedy.text(fits && !remedy.fits ? " (not enough by itself)" : "");
+    return text;
+}
+
+// What remains where nothing is enough by itself.
+std::string lastWays(const PackCost& cost, const Profile& profile, bool fit_would_do) {
+    std::string text;
+    if (profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid)
+        text += "\n  --set grids.global=off leaves out the global grid, and with it the light of what moves";
+    if (fit_would_do) text += "\n--fit tries these together";
     return text;
 }
 
@@ -55,9 +66,12 @@ Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bo
         if (within) return pack;
         const auto overBudget = [&](const std::string& why) {
             result.remedies = remedies(*pack, cost, result.profile, losses);
+            std::string ways = waysOut(result.remedies);
+            if (result.remedies.empty() || !result.remedies[0].fits)
+                ways += lastWays(cost, result.profile,
+                                 !fit && !fittingRemedy(*pack, cost, result.profile, losses).changes.empty());
             result.pack = std::move(*pack);
-            return fail(ErrorCode::OverBudget,
-                        within.error().message + why + waysOut(result.remedies) + changedBefore(result.fitted));
+            return fail(ErrorCode::OverBudget, within.error().message + why + ways + changedBefore(result.fitted));
         };
         if (!fit || round + 1 == fit_rounds_max) return overBudget("");
         const auto density_steps =

@@ -372,6 +372,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
         by(firstFitting(losses, limits, no_index));
         if (const uint32_t largest = largestSet(pack, cost); largest > 0) by(firstFitting(losses, limits, largest));
     }
+    found = withoutDominated(std::move(found));
     // What is not predicted comes last, but where nothing else helps.
     const bool grid_is_over = gridIsOver(cost, profile) || localGridsAreOver(cost, profile);
     std::ranges::stable_sort(

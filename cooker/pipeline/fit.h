@@ -13,9 +13,9 @@ inline constexpr const char* density_key = "lightmaps.texels_per_metre";
 
 // For a pack that is over a budget: raising thresholds where the least light goes for the bytes, raising all of them,
 // raising that of the set with the most records, lowering the density; fewer probes where the global grid is over, or
-// where they alone bring the total within its budget; or of probes and texels their share. None is empty, and none
-// costs more light than there is. Those that fit first, then by error; where a grid itself is over, what makes that
-// smaller before what does not.
+// where they alone bring the total within its budget; or of probes and texels their share. None is empty, none
+// costs more light than there is, and none is dominated. Those that fit first, then by error; where a grid itself is
+// over, what makes that smaller before what does not.
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <set>
 
 namespace dimmer::cook {
 namespace {
@@ -24,7 +25,44 @@ std::string shellWord(const std::string& text) {
     return quoted + "'";
 }
 
+// Whether `a` changes settings that `b` changes too, fewer of them, and is no worse.
+bool dominates(const Remedy& a, const Remedy& b) {
+    const auto in_b = [&](const Change& c) {
+        return std::ranges::find(b.changes, c.key, &Change::key) != b.changes.end();
+    };
+    return a.changes.size() < b.changes.size() && std::ranges::all_of(a.changes, in_b) && a.fits >= b.fits &&
+           a.saves >= b.saves && a.error <= b.error && a.energy <= b.energy && a.moves_light <= b.moves_light;
+}
+
+// Thresholds of single sets are of the same kind as that of all.
+std::set<std::string_view> kindOf(const Remedy& remedy) {
+    std::set<std::string_view> kind;
+    for (const Change& c : remedy.changes)
+        kind.insert(c.key.starts_with("records.threshold") ? "records.threshold" : std::string_view(c.key));
+    return kind;
+}
+
 }  // namespace
+
+std::vector<Remedy> withoutDominated(std::vector<Remedy> found) {
+    const std::vector<Remedy> all = found;
+    std::erase_if(found, [&](const Remedy& b) {
+        return std::ranges::any_of(all, [&](const Remedy& a) { return dominates(a, b); });
+    });
+    return found;
+}
+
+std::vector<Remedy> bestOfEachKind(const std::vector<Remedy>& found) {
+    std::vector<Remedy> best;
+    for (const Remedy& remedy : found) {
+        const auto same = std::ranges::find(best, kindOf(remedy), kindOf);
+        if (same == best.end())
+            best.push_back(remedy);
+        else if (remedy.saves > same->saves)
+            *same = remedy;
+    }
+    return best;
+}
 
 std::string Remedy::options() const {
     std::vector<std::string> parts;

@@ -31,4 +31,10 @@ struct Remedy {
     std::string options() const;
 };
 
+// Without those beside which another changes less and is no worse in anything that is said of it.
+std::vector<Remedy> withoutDominated(std::vector<Remedy> found);
+
+// Of those that change the same kinds of settings (thresholds, density, probes), the one that saves most.
+std::vector<Remedy> bestOfEachKind(const std::vector<Remedy>& found);
+
 }  // namespace dimmer::cook

@@ -39,6 +39,33 @@ TEST(RemedyText, OptionsAreWordsOfAShell) {
     EXPECT_EQ(remedy.options(), R"(--set 'records.thresholds.John'\''s $lamp=0.5' --set records.thresholds.lamp=1)");
 }
 
+// That of all sets does what the set's own would do as well, and no more light goes.
+TEST(Dominated, IsWhatChangesMoreAndIsNoBetter) {
+    const Remedy less{.changes = {{"a", 0, 1}}, .saves = 1000, .error = 0.01};
+    Remedy more{.changes = {{"a", 0, 0.5f}, {"b", 0, 1}}, .saves = 1000, .error = 0.01};
+    EXPECT_THAT(withoutDominated({more, less}), ElementsAre(testing::Field(&Remedy::changes, less.changes)));
+    // One that is better in anything stays, and so does one of other settings.
+    Remedy saves = more, loses = more, fits = more, other = more;
+    saves.saves = 1001;
+    loses.error = 0.009;
+    fits.fits = true;
+    other.changes[0].key = "c";
+    for (const Remedy& kept : {saves, loses, fits, other}) EXPECT_EQ(withoutDominated({kept, less}).size(), 2u);
+}
+
+TEST(BestOfEachKind, SavesMost) {
+    const auto remedy = [](std::vector<Change> changes, uint64_t saves) {
+        return Remedy{.changes = std::move(changes), .saves = saves};
+    };
+    const Change all{"records.threshold", 0, 1}, set{"records.thresholds.hall", 0, 1},
+        density{"lightmaps.texels_per_metre", 4, 2}, probes{"grids.probes_max", 20, 10};
+    std::vector<uint64_t> saved;
+    for (const Remedy& r : bestOfEachKind({remedy({set}, 1), remedy({density}, 2), remedy({all, set}, 3),
+                                           remedy({density, probes}, 4), remedy({all}, 2), remedy({probes}, 1)}))
+        saved.push_back(r.saves);
+    EXPECT_THAT(saved, ElementsAre(3, 2, 4, 1));
+}
+
 // 1.5 times 0.03 is 0.044999998 in floats; what is written reads back as the same float.
 TEST(Ladder, HoldsDecimalsAsPeopleWriteThem) {
     std::vector<std::string> texts;
