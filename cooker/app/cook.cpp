@@ -1,5 +1,6 @@
 #include <app/command.h>
 #include <app/cook_json.h>
+#include <app/depfile.h>
 #include <app/files.h>
 #include <app/json_progress.h>
 #include <app/say.h>
@@ -24,7 +25,7 @@ namespace {
 
 struct CookArguments {
     CookOptions options;
-    std::string json;
+    std::string json, depfile;
     std::string write_level;
     std::string report;
     std::string progress = "text";
@@ -100,6 +101,7 @@ std::vector<NamedFile> inputsOf(const CookArguments& a) {
 std::vector<NamedFile> outputsOf(const CookArguments& a) {
     return {{"--output", a.options.pack},
             printed("--json", a.json),
+            {"--depfile", a.depfile},
             {"--write-level", a.write_level},
             {"--report", a.report}};
 }
@@ -114,11 +116,14 @@ void addCache(const CookArguments& a, std::vector<NamedFile>& inputs) {
         inputs.push_back({"--cache", above, true});
 }
 
-Expected<void> checkArguments(const CookArguments& a, std::vector<NamedFile> inputs) {
+Expected<void> checkArguments(const CookArguments& a, const std::vector<NamedFile>& inputs) {
     if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" stands for a file here
     if (a.options.cache == "-") return fail(ErrorCode::InvalidArgument, "--cache: '-' is not a folder");
-    addCache(a, inputs);
-    if (auto ok = checkFiles(inputs, outputsOf(a)); !ok) return ok;
+    std::vector<NamedFile> kept = inputs;
+    addCache(a, kept);
+    if (auto ok = checkFiles(kept, outputsOf(a)); !ok) return ok;
+    if (!a.depfile.empty())
+        if (auto ok = depfileText(a.options.pack, filesThere(inputs)); !ok) return std::unexpected(ok.error());
     if (std::filesystem::path(a.write_level).extension() == ".gltf")
         return fail(
             ErrorCode::InvalidArgument,
@@ -129,7 +134,13 @@ Expected<void> checkArguments(const CookArguments& a, std::vector<NamedFile> inp
 }
 
 // What is written beside the pack.
-Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
+Expected<void> writeOthers(const CookArguments& a, const std::vector<std::filesystem::path>& inputs,
+                           CookResult& result) {
+    if (!a.depfile.empty()) {
+        const auto text = depfileText(a.options.pack, inputs);
+        if (!text) return std::unexpected(text.error());
+        if (auto ok = writeFileAtomically(a.depfile, std::as_bytes(std::span(*text))); !ok) return ok;
+    }
     if (!a.write_level.empty()) {
         std::vector<std::string>& warnings = result.stats.warnings;
         const size_t said = warnings.size();
@@ -139,7 +150,7 @@ Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
     }
     if (!a.report.empty())
         if (auto ok = writeReport(result, a); !ok) return ok;
-    return a.json.empty() ? Expected<void>() : writeJson(cookJson(Verdict::Cooked, a.options, result), a.json);
+    return a.json.empty() ? Expected<void>() : writeJson(cookJson(Verdict::Cooked, a.options, inputs, result), a.json);
 }
 
 // Whatever fails, what is there afterwards is of this cook. A file that is something else too is left to
@@ -152,10 +163,12 @@ Expected<void> removeOldJson(const CookArguments& a, std::vector<NamedFile> othe
     return its_own ? removeCookJson(a.json) : Expected<void>();
 }
 
-int reportFailure(const CookArguments& a, const Error& error, const CookResult& failed) {
+int reportFailure(const CookArguments& a, const std::vector<std::filesystem::path>& inputs, const Error& error,
+                  const CookResult& failed) {
     const int exit_code = reportError(error);
     if (error.code != ErrorCode::OverBudget || a.json.empty()) return exit_code;
-    if (auto ok = writeJson(cookJson(Verdict::OverBudget, a.options, failed), a.json); !ok) reportError(ok.error());
+    const auto json = cookJson(Verdict::OverBudget, a.options, inputs, failed);
+    if (auto ok = writeJson(json, a.json); !ok) reportError(ok.error());
     return exit_code;
 }
 
@@ -174,8 +187,9 @@ int run(const CookArguments& a) {
     CookResult failed;
     auto result = cook(options, *progress, &failed);
     sayWarnings(result ? result->stats.warnings : failed.stats.warnings);
-    if (!result) return reportFailure(a, result.error(), failed);
-    if (auto ok = writeOthers(a, *result); !ok)
+    const auto files = filesThere(inputs);
+    if (!result) return reportFailure(a, files, result.error(), failed);
+    if (auto ok = writeOthers(a, files, *result); !ok)
         return reportError({ok.error().code, fmt::format("{}\nThe pack has been written: {}", ok.error().message,
                                                          options.pack.string())});
     if (a.json != "-") printTable(*result, costOf(result->pack));
@@ -253,6 +267,10 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         "--json", a->json,
         "write the result (cooked or over_budget), bytes against budgets, stage times (s), rays, peak memory (bytes), "
         "warnings, what --fit changed and, over budget, all remedies there; - for stdout, in the table's place");
+    c->add_option(
+        "--depfile", a->depfile,
+        "write there what the pack is made from, in Make's syntax: level, buffers, images, light profiles, sky, "
+        "profiles");
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"

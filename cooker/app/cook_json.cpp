@@ -68,7 +68,8 @@ Json suggestionsJson(const CookStats& stats) {
     return Json(stats.suggested_combinations);
 }
 
-Json cookJson(Verdict verdict, const CookOptions& options, const CookResult& result) {
+Json cookJson(Verdict verdict, const CookOptions& options, const std::vector<std::filesystem::path>& inputs,
+              const CookResult& result) {
     const bool cooked = verdict == Verdict::Cooked;
     const PackCost cost = costOf(result.pack);
     Json json = {{"result", cooked ? "cooked" : "over_budget"},
@@ -76,6 +77,8 @@ Json cookJson(Verdict verdict, const CookOptions& options, const CookResult& res
                  {"level", options.level.string()},
                  {"profile", options.profile},
                  {"quality", options.quality}};
+    auto& files = json["inputs"] = Json::array();
+    for (const auto& input : inputs) files.push_back(input.string());
     if (cooked) json["pack_id"] = packId(options.pack);
     addTimes(result.stats, json);
     if (cooked) json["file_bytes"] = result.file_bytes;
