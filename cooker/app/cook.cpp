@@ -255,10 +255,18 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                       ->excludes(no_cache);
     // What is measured against is made anew.
     for (CLI::Option* baseline : {per_set_passes, grid_baseline}) baseline->excludes(cache)->excludes(limit);
-    c->add_flag("--fit", a->options.fit,
-                "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
-                "probes, until it fits; "
-                "the table says what was changed and the mean error that it adds");
+    auto* fit =
+        c->add_flag("--fit", a->options.fit,
+                    "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
+                    "probes, until it fits; "
+                    "the table says what was changed and the mean error that it adds");
+    c->add_option(
+         "--fit-max-error", a->options.fit_error_max,
+         "exit with 3 instead where --fit would add a larger mean error at surfaces as predicted, e.g. 0.05 for "
+         "5 %; what fewer probes cost is not predicted")
+        ->needs(fit)
+        ->check(refuseNotFinite)
+        ->check(CLI::NonNegativeNumber);
     c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not")
         ->excludes(no_cache)
         ->excludes(per_set_passes)

@@ -36,6 +36,7 @@ Key packKey(const Scene& scene, const Profile& profile, const CookOptions& optio
                              .add(profile.settingsJson(options.quality))
                              .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{}, scene)))
                              .add(uint32_t{options.fit})
+                             .addOptional(options.fit_error_max)
                              .finish();
     cache.dependsOn("level", level);
     cache.dependsOn("settings", settings);
@@ -59,7 +60,7 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
 
 Expected<std::vector<std::byte>> makePack(const Scene& scene, const CookOptions& options, Progress& progress,
                                           CookCache* cache, CookResult& result) {
-    auto pack = cookWithin(scene, options.quality, options.fit, progress, cache, result);
+    auto pack = cookWithin(scene, options, progress, cache, result);
     if (!pack) return std::unexpected(pack.error());
     result.pack = std::move(*pack);
     const Stopwatch watch(result.stats.seconds["write"]);

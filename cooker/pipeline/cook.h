@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ struct CookOptions {
     bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
-    bool fit = false;  // over budget: change settings until it fits; see CookResult::fitted
+    bool fit = false;                         // over budget: change settings until it fits; see CookResult::fitted
+    std::optional<float> fit_error_max = {};  // the mean error, a share, that `fit` may add at most, as predicted
 };
 
 struct CookStats {
