@@ -124,6 +124,10 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     auto idle = resolveSettings(*profile, *scene, options.set);
     if (!idle) return std::unexpected(idle.error());
     for (std::string& warning : otherQualities(*profile, options.quality)) idle->push_back(std::move(warning));
+    if (hidesFile(options.profile))
+        idle->push_back(fmt::format(
+            "--profile {0} is the shipped one, and the file of that name is not read; --profile ./{0} reads it",
+            options.profile));
     // The scene's, too: a pack in the cache is that of the same warnings.
     for (auto* warnings : {&result.stats.warnings, &scene->warnings})
         warnings->insert(warnings->end(), idle->begin(), idle->end());
