@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 namespace dimmer::cook {
@@ -36,7 +37,7 @@ int reportError(const Error& error) {
 Expected<void> writeJson(const nlohmann::ordered_json& json, const std::string& file) {
     const std::string text = json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     if (file == "-") {
-        fmt::print("{}", text);
+        std::fwrite(text.data(), 1, text.size(), stdout);  // main() looks whether it could be written
         return {};
     }
     return writeFileAtomically(file, std::as_bytes(std::span(text)));

@@ -1,7 +1,8 @@
 #include <app/command.h>
+#include <app/cook_json.h>
+#include <app/depfile.h>
 #include <app/files.h>
 #include <app/json_progress.h>
-#include <app/pack_id.h>
 #include <app/say.h>
 #include <app/terminal_progress.h>
 #include <pipeline/budget.h>
@@ -24,7 +25,7 @@ namespace {
 
 struct CookArguments {
     CookOptions options;
-    std::string json;
+    std::string json, depfile;
     std::string write_level;
     std::string report;
     std::string progress = "text";
@@ -53,13 +54,6 @@ void printCache(const CookStats& stats) {
     if (stats.cache.empty()) fmt::print("no cache was used\n");
 }
 
-nlohmann::ordered_json cacheJson(const CookStats& stats) {
-    auto list = nlohmann::ordered_json::array();
-    for (const CacheLine& line : stats.cache)
-        list.push_back({{"stage", line.what}, {"reused", line.reused}, {"why", line.why}});
-    return list;
-}
-
 // Why there is no global grid; empty where there is one.
 std::string gridNote(const CookResult& result) {
     if (!result.pack.probes.global.empty()) return {};
@@ -81,47 +75,6 @@ void printTable(const CookResult& result, const PackCost& cost) {
     for (const Remedy& remedy : result.fitted) fmt::print("fitted: {}\n", remedy.text());
 }
 
-nlohmann::ordered_json fittedJson(const CookResult& result) {
-    auto list = nlohmann::ordered_json::array();
-    for (const Remedy& remedy : result.fitted) {
-        nlohmann::ordered_json changes;
-        // The shortest decimal that reads back as the same float.
-        for (const Change& c : remedy.changes) changes[c.key] = std::stod(fmt::format("{}", c.to));
-        list.push_back({{"changes", changes},
-                        {"saves", remedy.saves},
-                        {"energy", std::stod(fmt::format("{:.4g}", remedy.energy))},
-                        {"energy_of", remedy.energy > 0 ? nlohmann::ordered_json(remedy.energy_of)
-                                                        : nlohmann::ordered_json(nullptr)},
-                        {"error", remedy.texels ? nlohmann::ordered_json(std::stod(fmt::format("{:.4g}", remedy.error)))
-                                                : nlohmann::ordered_json(nullptr)}});
-    }
-    return list;
-}
-
-nlohmann::ordered_json suggestions(const CookStats& stats) {
-    return nlohmann::ordered_json(stats.suggested_combinations);
-}
-
-nlohmann::ordered_json toJson(const CookResult& result, const std::filesystem::path& pack) {
-    nlohmann::ordered_json json;
-    json["pack_id"] = packId(pack);
-    json["seconds"] = result.stats.seconds;
-    auto& of_bake = json["bake_seconds"] = nlohmann::ordered_json::object();
-    for (const auto& [stage, seconds] : result.stats.bake_seconds) of_bake[stage] = seconds;
-    json["rays"] = result.stats.rays;
-    const auto bake = result.stats.seconds.find("bake");
-    json["rays_per_second"] = bake == result.stats.seconds.end() || bake->second <= 0
-                                  ? 0
-                                  : static_cast<double>(result.stats.rays) / bake->second;
-    json["peak_bytes"] = result.stats.peak_bytes;
-    json["file_bytes"] = result.file_bytes;
-    json["warnings"] = result.stats.warnings;
-    json["cache"] = cacheJson(result.stats);
-    if (!result.fitted.empty()) json["fitted"] = fittedJson(result);
-    if (!result.stats.suggested_combinations.empty()) json["dimmer_combinations"] = suggestions(result.stats);
-    return json;
-}
-
 Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
     const auto pack = Pack::fromData(PackData(result.pack));
     if (!pack) return std::unexpected(pack.error());
@@ -134,28 +87,43 @@ Expected<void> writeReport(const CookResult& result, const CookArguments& a) {
     return writeReport(*pack, input, a.report);
 }
 
-Expected<void> checkArguments(const CookArguments& a) {
+// What the cook is made from.
+std::vector<NamedFile> inputsOf(const CookArguments& a) {
     std::vector<NamedFile> inputs = {{"LEVEL", a.options.level}};
     addFilesOf("LEVEL", filesNamedBy(a.options.level), inputs);
     const auto shipped = shippedProfiles();
     if (std::ranges::find(shipped, a.options.profile) == shipped.end())
         inputs.push_back({"--profile", a.options.profile});
     addFilesOf("--profile", filesExtendedBy(a.options.profile), inputs);
-    if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" stands for a file here
-    if (a.options.cache == "-") return fail(ErrorCode::InvalidArgument, "--cache: '-' is not a folder");
-    // A cook does without one that cannot be written; but it is made, with what is above it, before the bake.
+    return inputs;
+}
+
+std::vector<NamedFile> outputsOf(const CookArguments& a) {
+    return {{"--output", a.options.pack},
+            printed("--json", a.json),
+            {"--depfile", a.depfile},
+            {"--write-level", a.write_level},
+            {"--report", a.report}};
+}
+
+// A cook does without a cache that cannot be written; but it is made, with what is above it, before the bake.
+void addCache(const CookArguments& a, std::vector<NamedFile>& inputs) {
     const auto cache = cacheOf(a);
     inputs.push_back({"--cache", cache, true});
     std::error_code ignored;  // what cannot even be looked at is no output's trouble
     for (auto above = cache.parent_path(); !above.empty() && !std::filesystem::exists(above, ignored);
          above = above.parent_path())
         inputs.push_back({"--cache", above, true});
-    if (auto ok = checkFiles(inputs, {{"--output", a.options.pack},
-                                      printed("--json", a.json),
-                                      {"--write-level", a.write_level},
-                                      {"--report", a.report}});
-        !ok)
-        return ok;
+}
+
+Expected<void> checkArguments(const CookArguments& a, const std::vector<NamedFile>& inputs) {
+    if (auto ok = checkWritable(a.options.pack); !ok) return ok;  // even "" stands for a file here
+    if (a.options.cache == "-") return fail(ErrorCode::InvalidArgument, "--cache: '-' is not a folder");
+    std::vector<NamedFile> kept = inputs;
+    addCache(a, kept);
+    if (auto ok = checkFiles(kept, outputsOf(a)); !ok) return ok;
+    if (!a.depfile.empty())
+        if (auto ok = depfileText(a.options.pack, filesThere(inputs)); !ok) return std::unexpected(ok.error());
     if (std::filesystem::path(a.write_level).extension() == ".gltf")
         return fail(
             ErrorCode::InvalidArgument,
@@ -166,7 +134,13 @@ Expected<void> checkArguments(const CookArguments& a) {
 }
 
 // What is written beside the pack.
-Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
+Expected<void> writeOthers(const CookArguments& a, const std::vector<std::filesystem::path>& inputs,
+                           CookResult& result) {
+    if (!a.depfile.empty()) {
+        const auto text = depfileText(a.options.pack, inputs);
+        if (!text) return std::unexpected(text.error());
+        if (auto ok = writeFileAtomically(a.depfile, std::as_bytes(std::span(*text))); !ok) return ok;
+    }
     if (!a.write_level.empty()) {
         std::vector<std::string>& warnings = result.stats.warnings;
         const size_t said = warnings.size();
@@ -176,11 +150,32 @@ Expected<void> writeOthers(const CookArguments& a, CookResult& result) {
     }
     if (!a.report.empty())
         if (auto ok = writeReport(result, a); !ok) return ok;
-    return a.json.empty() ? Expected<void>() : writeJson(toJson(result, a.options.pack), a.json);
+    return a.json.empty() ? Expected<void>() : writeJson(cookJson(Verdict::Cooked, a.options, inputs, result), a.json);
+}
+
+// Whatever fails, what is there afterwards is of this cook. A file that is something else too is left to
+// checkArguments().
+Expected<void> removeOldJson(const CookArguments& a, std::vector<NamedFile> others) {
+    addCache(a, others);
+    for (const NamedFile& output : outputsOf(a))
+        if (output.role != "--json") others.push_back(output);
+    const bool its_own = checkFiles(others, {printed("--json", a.json)}).has_value();
+    return its_own ? removeCookJson(a.json) : Expected<void>();
+}
+
+int reportFailure(const CookArguments& a, const std::vector<std::filesystem::path>& inputs, const Error& error,
+                  const CookResult& failed) {
+    const int exit_code = reportError(error);
+    if (error.code != ErrorCode::OverBudget || a.json.empty()) return exit_code;
+    const auto json = cookJson(Verdict::OverBudget, a.options, inputs, failed);
+    if (auto ok = writeJson(json, a.json); !ok) reportError(ok.error());
+    return exit_code;
 }
 
 int run(const CookArguments& a) {
-    if (auto ok = checkArguments(a); !ok) return reportError(ok.error());
+    const std::vector<NamedFile> inputs = inputsOf(a);
+    if (auto ok = removeOldJson(a, inputs); !ok) return reportError(ok.error());
+    if (auto ok = checkArguments(a, inputs); !ok) return reportError(ok.error());
     std::unique_ptr<Progress> progress;
     if (a.progress == "json")
         progress = std::make_unique<JsonProgress>();
@@ -189,17 +184,18 @@ int run(const CookArguments& a) {
     CookOptions options = a.options;
     options.cache_bytes_max = uint64_t{a.cache_limit_mb} << 20;
     options.cache = cacheOf(a);
-    std::vector<std::string> warnings;
-    auto result = cook(options, *progress, &warnings);
-    sayWarnings(result ? result->stats.warnings : warnings);
-    if (!result) return reportError(result.error());
-    if (auto ok = writeOthers(a, *result); !ok)
+    CookResult failed;
+    auto result = cook(options, *progress, &failed);
+    sayWarnings(result ? result->stats.warnings : failed.stats.warnings);
+    const auto files = filesThere(inputs);
+    if (!result) return reportFailure(a, files, result.error(), failed);
+    if (auto ok = writeOthers(a, files, *result); !ok)
         return reportError({ok.error().code, fmt::format("{}\nThe pack has been written: {}", ok.error().message,
                                                          options.pack.string())});
     if (a.json != "-") printTable(*result, costOf(result->pack));
     if (a.json != "-" && a.explain_cache) printCache(result->stats);
     if (a.json != "-" && a.suggest_combinations)
-        fmt::print("\n\"dimmer_combinations\": {}\n", suggestions(result->stats).dump());
+        fmt::print("\n\"dimmer_combinations\": {}\n", suggestionsJson(result->stats).dump());
     return exit_done;
 }
 
@@ -259,21 +255,35 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                       ->excludes(no_cache);
     // What is measured against is made anew.
     for (CLI::Option* baseline : {per_set_passes, grid_baseline}) baseline->excludes(cache)->excludes(limit);
-    c->add_flag("--fit", a->options.fit,
-                "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
-                "probes, until it fits; "
-                "the table says what was changed and the mean error that it adds");
+    auto* fit =
+        c->add_flag("--fit", a->options.fit,
+                    "over budget: raise the thresholds of the sets that lose least, lower the density or take fewer "
+                    "probes, until it fits; "
+                    "the table says what was changed and the mean error that it adds");
+    c->add_option(
+         "--fit-max-error", a->options.fit_error_max,
+         "exit with 3 instead where --fit would add a larger mean error at surfaces as predicted, e.g. 0.05 for "
+         "5 %; what fewer probes cost is not predicted")
+        ->needs(fit)
+        ->check(refuseNotFinite)
+        ->check(CLI::NonNegativeNumber);
     c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not")
         ->excludes(no_cache)
         ->excludes(per_set_passes)
         ->excludes(grid_baseline);
     c->add_option(
         "--json", a->json,
-        "write stage times (s), rays, peak memory (bytes) and warnings there; - for stdout, in the table's place");
+        "write the result (cooked or over_budget), bytes against budgets, stage times (s), rays, peak memory (bytes), "
+        "warnings, what --fit changed and, over budget, all remedies there; - for stdout, in the table's place");
+    c->add_option(
+        "--depfile", a->depfile,
+        "write there what the pack is made from, in Make's syntax: level, buffers, images, light profiles, sky, "
+        "profiles");
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"
-        "budget: exit code 3, nothing is written; Ctrl-C: 130, the old pack stays.\n"
+        "budget: exit code 3, nothing is written but --json; Ctrl-C: 130, the old pack stays. What an earlier cook\n"
+        "wrote to --json is removed first, so that it never passes for this one's.\n"
         "Distances in levels are in metres, densities in texels per metre.\n"
         "Example: dimmer cook house.gltf -o house.dimmer --profile console --quality draft");
     c->callback([a, quality, &exit_code] {

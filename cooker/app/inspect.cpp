@@ -1,3 +1,4 @@
+#include <app/budget_json.h>
 #include <app/command.h>
 #include <app/files.h>
 #include <format/layout.h>
@@ -23,23 +24,10 @@ struct InspectArguments {
     bool settings = false;
 };
 
-bool isDoor(const PackData& d, uint32_t element) {
-    return d.elements[element].kind == ElementKind::Door;
-}
-
 // The budgets that the pack was cooked for; none where it does not say.
 Profile budgetsOf(const PackData& d) {
     const auto settings = readSettings(d.settings_json);
     return settings ? settings->profile : Profile{};
-}
-
-nlohmann::ordered_json budgetsJson(const Profile& p) {
-    return {{"total", p.budget_total},
-            {"base_lightmaps", p.budget_base_lightmaps},
-            {"dynamic", p.budget_dynamic},
-            {"global_grid", p.budget_global_grid},
-            {"local_grids", p.budget_local_grids},
-            {"per_element", p.budget_per_element}};
 }
 
 // Per level of refinement.
@@ -127,14 +115,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
     nlohmann::ordered_json j;
     j["format_version"] = format::version;
     j["exposure"] = d.exposure;
-    j["bytes"] = {{"file", file_bytes},
-                  {"device", cost.device()},
-                  {"base_lightmap", cost.base_lightmap},
-                  {"dynamic", cost.dynamic},
-                  {"local_grids", cost.local_grids},
-                  {"global_grid", cost.global_grid},
-                  {"ancillary", cost.ancillary},
-                  {"meshes", cost.meshes}};
+    j["bytes"] = bytesJson(cost, file_bytes);
     uint64_t texels = 0;
     for (size_t n = 0; n < cost.overlap_histogram.size(); ++n) texels += cost.overlap_histogram[n];
     const size_t global_probes = d.probes.global.positions.size();
@@ -158,13 +139,7 @@ nlohmann::ordered_json toJson(const PackData& d, const PackCost& cost, uint64_t 
                                       {"bytes", recordBytes(d, k)},
                                       {"energy_dropped", c.energy_dropped}});
     }
-    j["elements"] = nlohmann::ordered_json::array();
-    for (const ElementCost& e : cost.elements)
-        j["elements"].push_back({{"name", d.elements[e.element].name},
-                                 {"kind", isDoor(d, e.element) ? "door" : "set"},
-                                 {"receivers", e.receivers},
-                                 {"bytes", e.bytes},
-                                 {"probe_bytes", e.probe_bytes}});
+    j["elements"] = elementsJson(d, cost);
     j["clusters"] = d.clusters.size();
     j["batches"] = d.batches.size();
     j["overlap_histogram"] = cost.overlap_histogram;

@@ -36,6 +36,7 @@ Key packKey(const Scene& scene, const Profile& profile, const CookOptions& optio
                              .add(profile.settingsJson(options.quality))
                              .add(bakeSettingsKey(bakeSettings(profile, q ? *q : Quality{}, scene)))
                              .add(uint32_t{options.fit})
+                             .addOptional(options.fit_error_max)
                              .finish();
     cache.dependsOn("level", level);
     cache.dependsOn("settings", settings);
@@ -59,7 +60,7 @@ Expected<std::vector<std::byte>> takePack(PackEntry entry, CookResult& result) {
 
 Expected<std::vector<std::byte>> makePack(const Scene& scene, const CookOptions& options, Progress& progress,
                                           CookCache* cache, CookResult& result) {
-    auto pack = cookWithin(scene, options.quality, options.fit, progress, cache, result);
+    auto pack = cookWithin(scene, options, progress, cache, result);
     if (!pack) return std::unexpected(pack.error());
     result.pack = std::move(*pack);
     const Stopwatch watch(result.stats.seconds["write"]);
@@ -123,6 +124,10 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     auto idle = resolveSettings(*profile, *scene, options.set);
     if (!idle) return std::unexpected(idle.error());
     for (std::string& warning : otherQualities(*profile, options.quality)) idle->push_back(std::move(warning));
+    if (hidesFile(options.profile))
+        idle->push_back(fmt::format(
+            "--profile {0} is the shipped one, and the file of that name is not read; --profile ./{0} reads it",
+            options.profile));
     // The scene's, too: a pack in the cache is that of the same warnings.
     for (auto* warnings : {&result.stats.warnings, &scene->warnings})
         warnings->insert(warnings->end(), idle->begin(), idle->end());
@@ -142,17 +147,17 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
         if (auto ok = writePack(options, *bytes, cache ? &*cache : nullptr, result.stats.warnings); !ok)
             return std::unexpected(ok.error());
     }
-    result.stats.peak_bytes = peakBytes();
     return {};
 }
 
 }  // namespace
 
-Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings) {
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, CookResult* failed) {
     CookResult result;
     auto ok = cookInto(result, options, progress);
+    result.stats.peak_bytes = peakBytes();
     if (ok) return result;
-    if (warnings) *warnings = std::move(result.stats.warnings);
+    if (failed) *failed = std::move(result);
     return std::unexpected(ok.error());
 }
 

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ struct CookOptions {
     bool light_grid = true;            // false: shadow rays to every light from everywhere, see BakeSettings
     std::filesystem::path cache = {};  // folder of what earlier cooks found out; empty: nothing is kept
     uint64_t cache_bytes_max = uint64_t{4} << 30;
-    bool fit = false;  // over budget: change settings until it fits; see CookResult::fitted
+    bool fit = false;                         // over budget: change settings until it fits; see CookResult::fitted
+    std::optional<float> fit_error_max = {};  // the mean error, a share, that `fit` may add at most, as predicted
 };
 
 struct CookStats {
@@ -54,15 +56,16 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
 
 struct CookResult {
     PackData pack;
-    Profile profile;             // as resolved, and fitted
-    std::vector<Remedy> fitted;  // what had to be changed, in the order of the cooks that it took
-    bool grid_wanted = false;    // the global one, by profile and level
+    Profile profile;               // as resolved, and fitted
+    std::vector<Remedy> fitted;    // what had to be changed, in the order of the cooks that it took
+    std::vector<Remedy> remedies;  // over budget: ways out
+    bool grid_wanted = false;      // the global one, by profile and level
     uint64_t file_bytes = 0;
     CookStats stats;
 };
 
-// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written; `warnings`, if given,
-// takes what was to be said until then.
-Expected<CookResult> cook(const CookOptions& options, Progress& progress, std::vector<std::string>* warnings = nullptr);
+// Reads the level, bakes, checks the budgets, writes the pack. On any error nothing is written; `failed`, if given,
+// takes what there was until then: warnings at least, over budget all but the file.
+Expected<CookResult> cook(const CookOptions& options, Progress& progress, CookResult* failed = nullptr);
 
 }  // namespace dimmer::cook

@@ -16,13 +16,38 @@ constexpr size_t remedies_named = 3;
 // Each round of `--fit` cooks anew: more than a few mean that something does not follow its prediction.
 constexpr int fit_rounds_max = 6;
 
-// Those that are enough come first, so that a first one that is not tells of all.
+// Those that are enough come first, so that a first one that is not tells of all: then one of each kind is named.
 std::string waysOut(const std::vector<Remedy>& found) {
-    if (found.empty()) return "; no setting would mend it";
-    std::string text = found[0].fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
-    for (const Remedy& remedy : std::span(found).first(std::min<size_t>(found.size(), remedies_named)))
-        text += "\n  " + remedy.text() + (found[0].fits && !remedy.fits ? " (not enough by itself)" : "");
+    if (found.empty()) return "; none of the settings that were tried mends it";
+    const bool fits = found[0].fits;
+    std::string text = fits ? "; what would help:" : "; nothing is enough by itself; what would help:";
+    const std::vector<Remedy> named = fits ? found : bestOfEachKind(found);
+    for (const Remedy& remedy : std::span(named).first(fits ? std::min(named.size(), remedies_named) : named.size()))
+        text += "\n  " + remedy.text(fits && !remedy.fits ? " (not enough by itself)" : "");
     return text;
+}
+
+// What remains where nothing is enough by itself.
+std::string lastWays(const PackCost& cost, const Profile& profile, bool fit_would_do) {
+    std::string text;
+    if (profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid)
+        text += "\n  --set grids.global=off leaves out the global grid, and with it the light of what moves";
+    if (fit_would_do) text += "\n--fit tries these together";
+    return text;
+}
+
+// As predicted; what fewer probes cost is not.
+double errorOf(const std::vector<Remedy>& fitted) {
+    double error = 0;
+    for (const Remedy& remedy : fitted) error += remedy.error;
+    return error;
+}
+
+std::string tooLossy(double error, float error_max) {
+    return fmt::format(
+        "; --fit would add a mean error of {:.2f} %, more than the {:.2f} % of --fit-max-error: allow more "
+        "there, or raise the budget",
+        100 * error, 100 * error_max);
 }
 
 // The figures of an error are those of the last cook, not of the settings that were asked for.
@@ -40,34 +65,40 @@ Expected<void> applyRemedy(const Remedy& remedy, Profile& profile) {
     return {};
 }
 
-Expected<PackData> cookWithin(const Scene& scene, const std::string& quality, bool fit, Progress& progress,
-                              CookCache* cache, CookResult& result) {
+Expected<PackData> cookWithin(const Scene& scene, const CookOptions& options, Progress& progress, CookCache* cache,
+                              CookResult& result) {
     const std::vector<std::string> import_warnings = result.stats.warnings;
     for (int round = 0;; ++round) {
         result.stats.warnings = import_warnings;
         result.stats.suggested_combinations.clear();
         LossTable losses;
         if (cache) cache->beginRound(round);
-        auto pack = cookScene(scene, result.profile, quality, progress, result.stats, cache, &losses);
+        auto pack = cookScene(scene, result.profile, options.quality, progress, result.stats, cache, &losses);
         if (!pack) return pack;
         const PackCost cost = costOf(*pack);
         const auto within = checkBudgets(*pack, cost, result.profile);
-        if (within) return pack;
-        if (!fit || round + 1 == fit_rounds_max) {
-            return fail(ErrorCode::OverBudget, within.error().message +
-                                                   waysOut(remedies(*pack, cost, result.profile, losses)) +
-                                                   changedBefore(result.fitted));
+        if (within) {
+            for (const Remedy& remedy : result.fitted)
+                result.stats.warnings.push_back("over budget, --fit changed settings: " + remedy.text());
+            return pack;
         }
+        const auto overBudget = [&](const std::string& why) {
+            result.remedies = remedies(*pack, cost, result.profile, losses);
+            std::string ways = waysOut(result.remedies);
+            if (result.remedies.empty() || !result.remedies[0].fits)
+                ways += lastWays(cost, result.profile,
+                                 !options.fit && !fittingRemedy(*pack, cost, result.profile, losses).changes.empty());
+            result.pack = std::move(*pack);
+            return fail(ErrorCode::OverBudget, within.error().message + why + ways + changedBefore(result.fitted));
+        };
+        if (!options.fit || round + 1 == fit_rounds_max) return overBudget("");
         const auto density_steps =
             std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
-        if (remedy.changes.empty()) {
-            const auto found = remedies(*pack, cost, result.profile, losses);
-            const char* why = found.empty() ? "; nothing that --fit changes would help"
-                                            : "; all that --fit changes would not be enough";
-            return fail(ErrorCode::OverBudget,
-                        within.error().message + why + waysOut(found) + changedBefore(result.fitted));
-        }
+        if (remedy.changes.empty()) return overBudget("; all that --fit changes would not be enough");
+        if (const double error = errorOf(result.fitted) + remedy.error;
+            options.fit_error_max && error > static_cast<double>(*options.fit_error_max))
+            return overBudget(tooLossy(error, *options.fit_error_max));
         if (auto ok = applyRemedy(remedy, result.profile); !ok) return std::unexpected(ok.error());
         result.fitted.push_back(std::move(remedy));
     }

@@ -1,10 +1,8 @@
 #include <pipeline/fit.h>
 
-#include <pipeline/human_bytes.h>
 #include <pipeline/settings.h>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -131,7 +129,7 @@ Remedy byRungs(const PackData& pack, const PackCost& cost, const Profile& profil
     const auto raised = [&](uint32_t group) {
         const float from = thresholdOf(pack, profile, group);
         if (!(from > 0 && from < threshold_max)) return from;  // what is stored whole has no multiples
-        return std::min(threshold_max, threshold_rungs[rungs[group]] * from);
+        return ladderOf(from)[rungs[group]];
     };
     // Always-on light goes by the threshold of all, which sets without one of their own go by too.
     const float of_all = rungs.empty() ? profile.threshold : raised(always_group);
@@ -354,19 +352,6 @@ bool mayFit(const PackData& pack, PackCost cost, Profile profile, const LossTabl
 
 }  // namespace
 
-std::string Remedy::text() const {
-    constexpr size_t named_max = 4;
-    std::vector<std::string> parts;
-    for (const Change& c : changes)
-        if (parts.size() < named_max) parts.push_back(fmt::format("{} {} -> {}", c.key, c.from, c.to));
-    const std::string more =
-        changes.size() > named_max ? fmt::format(" and {} more", changes.size() - named_max) : std::string();
-    return fmt::format("{}{}: saves {}{}{}{}", fmt::join(parts, ", "), more, humanBytes(saves),
-                       texels ? fmt::format(", adds a mean error of {:.2f} %", 100 * error) : "",
-                       energy > 0 ? fmt::format(", drops {:.2f} % of the light of {}", 100 * energy, energy_of) : "",
-                       moves_light ? ", coarsens the light of models by what is not predicted" : "");
-}
-
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses) {
     const auto limits = limitsOf(pack, cost, profile, losses);
@@ -387,6 +372,7 @@ std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const P
         by(firstFitting(losses, limits, no_index));
         if (const uint32_t largest = largestSet(pack, cost); largest > 0) by(firstFitting(losses, limits, largest));
     }
+    found = withoutDominated(std::move(found));
     // What is not predicted comes last, but where nothing else helps.
     const bool grid_is_over = gridIsOver(cost, profile) || localGridsAreOver(cost, profile);
     std::ranges::stable_sort(

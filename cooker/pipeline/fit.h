@@ -3,38 +3,19 @@
 
 #include <pipeline/budget.h>
 #include <pipeline/losses.h>
+#include <pipeline/remedy.h>
 
-#include <string>
 #include <vector>
 
 namespace dimmer::cook {
 
 inline constexpr const char* density_key = "lightmaps.texels_per_metre";
 
-// A setting to change.
-struct Change {
-    std::string key;
-    float from = 0, to = 0;
-    bool operator==(const Change&) const = default;
-};
-
-struct Remedy {
-    std::vector<Change> changes;
-    bool fits = false;
-    uint64_t saves = 0;          // bytes of device memory
-    double error = 0;            // mean relative error that it adds, all sets at weight 1; see LossTable
-    double energy = 0;           // of what loses most, the share of its stored light, by luminous flux at texels
-    std::string energy_of = {};  // a set, or always-on light through doors
-    bool moves_light = false;    // the light of what moves gets coarser; by how much is not predicted
-    bool texels = true;          // that of lightmaps changes, by `error`
-    std::string text() const;
-};
-
 // For a pack that is over a budget: raising thresholds where the least light goes for the bytes, raising all of them,
 // raising that of the set with the most records, lowering the density; fewer probes where the global grid is over, or
-// where they alone bring the total within its budget; or of probes and texels their share. None is empty, and none
-// costs more light than there is. Those that fit first, then by error; where a grid itself is over, what makes that
-// smaller before what does not.
+// where they alone bring the total within its budget; or of probes and texels their share. None is empty, none
+// costs more light than there is, and none is dominated. Those that fit first, then by error; where a grid itself is
+// over, what makes that smaller before what does not.
 std::vector<Remedy> remedies(const PackData& pack, const PackCost& cost, const Profile& profile,
                              const LossTable& losses);
 

@@ -4,6 +4,7 @@
 #include <charts/pages.h>
 #include <pack/pack_data.h>
 #include <pipeline/light_error.h>
+#include <pipeline/settings.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,11 +13,10 @@
 namespace dimmer::cook {
 namespace {
 
-uint8_t lostAt(const ReceiverLight& light, float threshold) {
-    if (!std::isfinite(light.keep) || !(threshold > 0)) return threshold_rungs.size();
+uint8_t lostAt(const ReceiverLight& light, const Ladder& thresholds) {
+    if (!std::isfinite(light.keep) || !(thresholds[0] > 0)) return threshold_rungs.size();
     uint8_t rung = 1;
-    while (rung < threshold_rungs.size() && light.keep >= std::min(threshold_max, threshold_rungs[rung] * threshold))
-        ++rung;
+    while (rung < threshold_rungs.size() && light.keep >= thresholds[rung]) ++rung;
     return rung;
 }
 
@@ -36,6 +36,14 @@ std::vector<uint32_t> copiesOf(const Texels& texels) {
 }
 
 }  // namespace
+
+Ladder ladderOf(float threshold) {
+    Ladder ladder;
+    for (size_t r = 0; r < ladder.size(); ++r)
+        ladder[r] = std::min(threshold_max,
+                             static_cast<float>(static_cast<double>(threshold_rungs[r]) * shortDecimal(threshold)));
+    return ladder;
+}
 
 // All light of one state of the doors.
 struct LossTable::StateLight {
@@ -108,12 +116,14 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
 std::vector<float> LossTable::listRecords(const Baked& baked, std::span<const float> thresholds) {
     std::vector<float> lux;
     std::vector<std::pair<float, Record>> row;
+    std::vector<Ladder> ladders;
+    for (const float threshold : thresholds) ladders.push_back(ladderOf(threshold));
     for (uint32_t i = 0; i < baked.light.rows(); ++i) {
         row.clear();
         for (const ReceiverLight& l : baked.light.row(i))
             if (l.term != always_group)
                 row.push_back(
-                    {luminance(l.light.irradiance()), {i, l.term, {}, 0, lostAt(l, thresholds[terms_[l.term].group])}});
+                    {luminance(l.light.irradiance()), {i, l.term, {}, 0, lostAt(l, ladders[terms_[l.term].group])}});
         // As limitOverlap() has them: of equals the earlier term.
         std::ranges::stable_sort(row, std::greater{}, [](const auto& entry) { return entry.first; });
         for (const auto& [light, record] : row) {

@@ -18,6 +18,10 @@ inline constexpr float threshold_max = 1;  // what settings take at most
 inline constexpr std::array<float, 18> threshold_rungs = {1,  1.5f, 2,  3,  4,   6,   8,   12,   16,
                                                           24, 32,   48, 64, 128, 256, 512, 1024, 1e30f};
 
+// What a threshold becomes at each rung, in decimals as people write them: 1.5 times 0.03 is 0.045, not 0.044999998.
+using Ladder = std::array<float, threshold_rungs.size()>;
+Ladder ladderOf(float threshold);
+
 // A rung per light group.
 using Rungs = std::vector<uint8_t>;
 

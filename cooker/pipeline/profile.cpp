@@ -117,11 +117,17 @@ Expected<Source> findSource(const std::string& name_or_file, const std::filesyst
     if (!file && usable) return fail(ErrorCode::Io, fmt::format("profile {}: it cannot be opened", path.string()));
     if (!file) {
         const auto shipped = shippedProfiles();
+        const std::string names = fmt::format("{}", fmt::join(shipped, ", "));
+        if (std::filesystem::exists(path, ignored))
+            return fail(
+                ErrorCode::NotFound,
+                fmt::format("profile {}: a profile must be a regular file, no folder, pipe or device: give one, "
+                            "or one of {}",
+                            path.string(), names));
         const std::string_view nearest = nearestName(name_or_file, {shipped.begin(), shipped.end()});
-        return fail(
-            ErrorCode::NotFound,
-            fmt::format("there is no profile '{}': give a file or one of {}{}", path.string(), fmt::join(shipped, ", "),
-                        nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
+        return fail(ErrorCode::NotFound,
+                    fmt::format("there is no profile '{}': give a file or one of {}{}", path.string(), names,
+                                nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest)));
     }
     std::stringstream text;
     text << file.rdbuf();
@@ -242,6 +248,12 @@ std::vector<std::string> shippedProfiles() {
     std::vector<std::string> names;
     for (const auto& [name, text] : shipped_profiles) names.emplace_back(name);
     return names;
+}
+
+bool hidesFile(const std::string& name) {
+    std::error_code ignored;
+    const auto shipped = shippedProfiles();
+    return std::ranges::find(shipped, name) != shipped.end() && std::filesystem::is_regular_file(name, ignored);
 }
 
 std::vector<std::filesystem::path> filesExtendedBy(const std::string& name_or_file) {

@@ -85,6 +85,9 @@ nlohmann::ordered_json listedSettings(const std::string& settings_json);
 Expected<Profile> loadProfile(const std::string& name_or_file);
 std::vector<std::string> shippedProfiles();
 
+// Whether the name of a shipped profile is that of a file here too, which loadProfile() then does not read.
+bool hidesFile(const std::string& name);
+
 // The files that a profile extends, one after another; shipped ones are none. Errors are for loadProfile() to tell.
 std::vector<std::filesystem::path> filesExtendedBy(const std::string& name_or_file);
 

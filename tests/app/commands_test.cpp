@@ -110,6 +110,26 @@ TEST_F(Commands, CookRefusesBadInputAndWritesNothing) {
     EXPECT_THAT(cook("nowhere/no.dimmer").err, Not(HasSubstr("charts")));
 }
 
+// The name alone is that of the shipped profile, as it is in every other folder.
+TEST_F(Commands, AFileThatAShippedProfileHidesIsPointedAt) {
+    write("console", R"({"extends": "quick.json"})");
+    const auto cookHere = [](const std::string& profile) {
+        return runProcess("/bin/sh", {"-c",
+                                      "cd '" + file(".") +
+                                          "' && exec \"$0\" cook level.gltf -o here.dimmer --quality "
+                                          "draft --set bake.draft.rays=32 --set bake.draft.series_rays=8 --profile " +
+                                          profile,
+                                      DIMMER_TOOL});
+    };
+    const std::string warning =
+        "dimmer: warning: --profile console is the shipped one, and the file of that name is not "
+        "read; --profile ./console reads it\n";
+    const auto shipped = cookHere("console"), local = cookHere("./console"), other = cookHere("handheld");
+    for (const auto* result : {&shipped, &local, &other}) EXPECT_EQ(result->exit_code, 0) << result->err;
+    EXPECT_THAT(shipped.err, HasSubstr(warning));
+    for (const auto* result : {&local, &other}) EXPECT_THAT(result->err, Not(HasSubstr("shipped")));
+}
+
 TEST_F(Commands, OverBudgetIsExitCodeThree) {
     write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
     write("kept.dimmer", "the old pack");

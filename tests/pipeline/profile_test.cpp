@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <pipeline/profile.h>
 #include <pipeline/small_level.h>
+#include <sys/stat.h>
 
 namespace dimmer::cook::test {
 namespace {
@@ -34,6 +35,21 @@ TEST(Profile, EveryShippedOneLoads) {
     // UBERBAKE's Table 1: 50 MB of dynamic records (binary megabytes), 77 MB in all.
     EXPECT_EQ(loadProfile("console")->budget_dynamic, 50u << 20);
     EXPECT_EQ(loadProfile("console")->budget_total, 77u << 20);
+}
+
+// A pipe may never end, and is gone once read.
+TEST(Profile, IsNoPipeAndNoFolder) {
+    const TemporaryFolder folder;
+    const std::string pipe = (folder.path / "pipe").string();
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    const std::string extending = writeText(folder, "mine.json", R"({"extends": "pipe"})").string();
+    for (const std::string& name : {pipe, folder.path.string(), std::string("/dev/null"), extending}) {
+        const auto profile = loadProfile(name);
+        ASSERT_FALSE(profile.has_value()) << name;
+        EXPECT_THAT(profile.error().message,
+                    AllOf(HasSubstr("profile " + (name == extending ? pipe : name) + ": "),
+                          HasSubstr("a profile must be a regular file"), testing::Not(HasSubstr("there is no"))));
+    }
 }
 
 TEST(Profile, ExtendsWhatItNamesAndDesktopOtherwise) {

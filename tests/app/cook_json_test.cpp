@@ -1,0 +1,127 @@
+// What `cook --json` tells a pipeline, of packs that fit and of those that do not.
+#include <app/tool_fixture.h>
+#include <dimmer/version.h>
+
+namespace dimmer::test {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class CookJson : public ToolTest {
+   protected:
+    static json read(const std::string& path) { return json::parse(readText(path), nullptr, false); }
+    static json inspect(const std::string& path) { return json::parse(runDimmer({"inspect", path, "--json"}).out); }
+    static json cookTight(const std::string& to) {
+        write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 30000, "dynamic": 15000}})");
+        const auto result = cook("over.dimmer", {"--json", to}, "level.gltf", "tight.json");
+        EXPECT_EQ(result.exit_code, 3) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(file("over.dimmer")));
+        return to == "-" ? json::parse(result.out, nullptr, false) : read(to);
+    }
+    static void expectNamed(const json& j, const std::string& result, const std::string& profile) {
+        EXPECT_EQ(j["result"], result);
+        EXPECT_EQ(j["version"], DIMMER_VERSION);
+        EXPECT_EQ(j["level"], file("level.gltf"));
+        EXPECT_EQ(j["profile"], file(profile));
+        EXPECT_EQ(j["quality"], "draft");
+    }
+};
+
+TEST_F(CookJson, OfAPackSaysWhatInspectSays) {
+    const json figures = read(file("cook.json")), inspected = inspect(pack());
+    expectNamed(figures, "cooked", "quick.json");
+    for (const char* block : {"bytes", "elements", "budgets"}) EXPECT_EQ(figures[block], inspected[block]) << block;
+    EXPECT_FALSE(figures.contains("remedies"));
+    uint64_t sum = 0;
+    for (const char* part : {"base_lightmap", "dynamic", "local_grids", "global_grid", "ancillary"})
+        sum += figures["bytes"][part].get<uint64_t>();
+    EXPECT_EQ(figures["bytes"]["device"], sum);
+    EXPECT_EQ(figures["bytes"]["file"], std::filesystem::file_size(pack()));
+}
+
+// Cooked without the budgets, the pack has the very bytes that were too many.
+TEST_F(CookJson, OverBudgetSaysWhatThePackWouldHaveCost) {
+    for (const std::string& to : {file("over.json"), std::string("-")}) {
+        const json figures = cookTight(to);
+        expectNamed(figures, "over_budget", "tight.json");
+        json bytes = inspect(pack())["bytes"];
+        bytes.erase("file");
+        EXPECT_EQ(figures["bytes"], bytes);
+        EXPECT_EQ(figures["elements"], inspect(pack())["elements"]);
+        EXPECT_EQ(figures["budgets"]["total"], 30000);
+        EXPECT_EQ(figures["budgets"]["dynamic"], 15000);
+        EXPECT_GT(figures["bytes"]["device"], 30000);
+        for (const char* of_a_file : {"pack_id", "file_bytes"}) EXPECT_FALSE(figures.contains(of_a_file)) << of_a_file;
+    }
+}
+
+TEST_F(CookJson, ARemedyThatFitsCooks) {
+    const json remedies = cookTight(file("over.json"))["remedies"];
+    ASSERT_FALSE(remedies.empty());
+    size_t fitting = 0;
+    for (const json& remedy : remedies) {
+        EXPECT_GT(remedy["saves"], 0);
+        EXPECT_TRUE(remedy.contains("error"));
+        std::istringstream words(remedy["options"].get<std::string>());
+        std::vector<std::string> more;
+        for (std::string word; words >> word;) more.push_back(word);
+        EXPECT_EQ(more.size(), 2 * remedy["changes"].size());
+        if (!remedy["fits"]) continue;
+        ++fitting;
+        const auto cooked = cook("remedied.dimmer", more, "level.gltf", "tight.json");
+        EXPECT_EQ(cooked.exit_code, 0) << remedy << cooked.err;
+    }
+    EXPECT_GT(fitting, 0u);
+}
+
+TEST_F(CookJson, OfAnEarlierCookDoesNotOutliveAFailedOne) {
+    const std::string figures = readText(file("cook.json"));
+    const auto expectGone = [&](const std::string& pack_name, const std::string& level, const std::string& profile) {
+        const std::string old = write("old.json", figures);
+        const auto result = cook(pack_name, {"--json", old}, level, profile);
+        EXPECT_EQ(result.exit_code, 2) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(old)) << result.err;
+    };
+    expectGone("new.dimmer", "none.gltf", "quick.json");
+    expectGone("new.dimmer", "level.gltf", "none.json");
+    expectGone("nowhere/new.dimmer", "level.gltf", "quick.json");
+    // Over budget it is written anew.
+    EXPECT_EQ(cookTight(write("old.json", figures))["result"], "over_budget");
+    // Those of a version that named no result, too, and behind a link the link stays.
+    json before = json::parse(figures);
+    before.erase("result");
+    write("before.json", before.dump());
+    std::filesystem::create_symlink("before.json", file("link.json"));
+    EXPECT_EQ(cook("new.dimmer", {"--json", file("link.json")}, "none.gltf").exit_code, 2);
+    EXPECT_FALSE(std::filesystem::exists(file("before.json")));
+    EXPECT_TRUE(std::filesystem::is_symlink(file("link.json")));
+}
+
+TEST_F(CookJson, AFailedCookRemovesNothingElse) {
+    for (const std::string& text : {std::string("notes"), std::string(R"({"result": "mine", "seconds": 1})"),
+                                    std::string(100000, '[') + std::string(100000, ']')}) {
+        const std::string other = write("other.json", text);
+        EXPECT_EQ(cook("new.dimmer", {"--json", other}, "none.gltf").exit_code, 2);
+        EXPECT_TRUE(readText(other) == text);
+    }
+    // Figures that are an input or another output as well are refused as they are.
+    const std::string figures = readText(file("cook.json")), twice = write("twice.json", figures);
+    for (const auto& [pack_name, level, profile] : {std::tuple{"new.dimmer", "twice.json", "quick.json"},
+                                                    {"new.dimmer", "level.gltf", "twice.json"},
+                                                    {"twice.json", "level.gltf", "quick.json"}}) {
+        const auto result = cook(pack_name, {"--json", twice}, level, profile);
+        EXPECT_EQ(result.exit_code, 2);
+        EXPECT_THAT(result.err, HasSubstr("are the same file"));
+        EXPECT_EQ(readText(twice), figures);
+    }
+}
+
+TEST_F(CookJson, WithoutAVerdictPrintsNothing) {
+    const auto result = cook("new.dimmer", {"--json", "-"}, "none.gltf");
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.out, IsEmpty());
+}
+
+}  // namespace
+}  // namespace dimmer::test
