@@ -25,9 +25,10 @@ FaceWalls::FaceWalls(const PlanarFace& face, const Axes& axes, const Reach& reac
       standing_(standing),
       shadows_(standing.triangles ? shadowsNear(standing) : std::nullopt) {}
 
-bool FaceWalls::partFrom(const PlanarFace& other) const {
-    return mayPart(axes_.rectOf(face_), axes_.rectOf(other)) &&
-           (wallBetween(face_, other) || wallBetween(other, face_));
+FaceWalls::Parting FaceWalls::from(const PlanarFace& other) const {
+    if (!mayPart(axes_.rectOf(face_), axes_.rectOf(other))) return Parting::None;
+    const Parting there = between(face_, other);
+    return there == Parting::Wall ? there : std::max(there, between(other, face_));
 }
 
 std::optional<std::vector<Rect>> FaceWalls::shadowsNear(const Standing& standing) const {
@@ -79,7 +80,8 @@ bool FaceWalls::mayPart(Rect a, const Rect& b) const {
     return !shadows_ || std::ranges::any_of(*shadows_, [&](const Rect& shadow) { return shadow.touches(a); });
 }
 
-bool FaceWalls::wallBetween(const PlanarFace& a, const PlanarFace& b) const {
+FaceWalls::Parting FaceWalls::between(const PlanarFace& a, const PlanarFace& b) const {
+    Parting parting = Parting::None;
     for (size_t e = 0; e < 3; ++e)
         for (const float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
             glm::vec3 p = glm::mix(a.corners_m[e], a.corners_m[(e + 1) % 3], s);
@@ -91,9 +93,11 @@ bool FaceWalls::wallBetween(const PlanarFace& a, const PlanarFace& b) const {
             q += step_in * (middleOf(b) - q);
             const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
             if (!mayPart({on_p, on_p}, {on_q, on_q})) continue;
-            if (wallBetween(p, q) && wallBetween(outOfWalls(p, a), outOfWalls(q, b))) return true;
+            if (!wallBetween(p, q)) continue;
+            if (wallBetween(outOfWalls(p, a), outOfWalls(q, b))) return Parting::Wall;
+            parting = Parting::FromWithin;
         }
-    return false;
+    return parting;
 }
 
 bool FaceWalls::wallBetween(glm::vec3 p, glm::vec3 q) const {
@@ -103,8 +107,7 @@ bool FaceWalls::wallBetween(glm::vec3 p, glm::vec3 q) const {
     });
 }
 
-// A face goes on to the middle of the wall that it was cut at: what is in there sees nothing of its own room. The first
-// place on the way to the face's middle that is in the open, if there is one.
+// The first place on the way to the face's middle that is in the open, if there is one.
 glm::vec3 FaceWalls::outOfWalls(glm::vec3 p, const PlanarFace& face) const {
     if (!standing_.inside) return p;
     for (const float share : {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f}) {

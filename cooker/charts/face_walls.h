@@ -31,13 +31,20 @@ class FaceWalls {
 
     // Nothing stands where a wall would.
     bool none() const { return shadows_ && shadows_->empty(); }
-    bool partFrom(const PlanarFace& other) const;
+    enum class Parting {
+        None,
+        // Of what lies in half of a wall itself: a face goes on to the middle of the wall that it was cut at, and from
+        // in there the rest of its own room is beyond the wall.
+        FromWithin,
+        Wall
+    };
+    Parting from(const PlanarFace& other) const;
 
    private:
     std::optional<std::vector<Rect>> shadowsNear(const Standing& standing) const;
     Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, float low, float high) const;
     bool mayPart(Rect a, const Rect& b) const;
-    bool wallBetween(const PlanarFace& a, const PlanarFace& b) const;
+    Parting between(const PlanarFace& a, const PlanarFace& b) const;
     bool wallBetween(glm::vec3 p, glm::vec3 q) const;
     glm::vec3 outOfWalls(glm::vec3 p, const PlanarFace& face) const;
     glm::vec3 lift(float height_m) const;

@@ -102,11 +102,10 @@ class Padding {
         const TangentFrame& frame = unwrap_.frames[own_face];
         const float texel_m = std::sqrt(unwrap_.texel_area_m2[own_face]);
         const bool curved = unwrap_.charts[chart].curved;
-        const uint32_t found =
-            below(fill, chart, curved ? bend_max * texel_m : same_plane_m, [&](uint32_t face) {
-                const TangentFrame& other = unwrap_.frames[face];
-                return curved ? sameFrame(other, frame) : sameToTheEye(other, frame);
-            });
+        const uint32_t found = below(fill, chart, curved ? bend_max * texel_m : same_plane_m, [&](uint32_t face) {
+            const TangentFrame& other = unwrap_.frames[face];
+            return curved ? sameFrame(other, frame) : sameToTheEye(other, frame);
+        });
         if (found != no_index || !smooth_.any(chart)) return found;
         return below(fill, chart, seam_bend_max * texel_m, [&](uint32_t face) {
             return smooth_.meet(chart, unwrap_.face_chart[face]) &&

@@ -62,9 +62,8 @@ SmoothSeams::SmoothSeams(const RayScene& rays, const Unwrap& unwrap) {
                glm::dot(a.normal_high, b.normal_high) > shared_normal_cos;
     };
     for (size_t i = 0; i < edges.size(); ++i)
-        for (size_t k = i + 1; k < edges.size() && std::tie(edges[k].low, edges[k].high) ==
-                                                       std::tie(edges[i].low, edges[i].high);
-             ++k) {
+        for (size_t k = i + 1;
+             k < edges.size() && std::tie(edges[k].low, edges[k].high) == std::tie(edges[i].low, edges[i].high); ++k) {
             if (edges[i].chart == edges[k].chart || !shadedAsOne(edges[i], edges[k])) continue;
             pairs_.insert({edges[i].chart, edges[k].chart});
             pairs_.insert({edges[k].chart, edges[i].chart});

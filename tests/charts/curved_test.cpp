@@ -288,8 +288,7 @@ TEST(CurvedCharts, LightGoesOnAroundAColumn) {
     scene.meshes.push_back(meshOf([&](float s, float t) { return at(std::fmod(s, sides), t, radius_m); }, sides, 2,
                                   addMaterial(scene, lambert(0))));
     for (size_t i = 0; i < scene.meshes[0].normals.size(); ++i)
-        scene.meshes[0].normals[i] =
-            glm::normalize(scene.meshes[0].positions_m[i] * glm::vec3(1, 0, 1));
+        scene.meshes[0].normals[i] = glm::normalize(scene.meshes[0].positions_m[i] * glm::vec3(1, 0, 1));
     PunctualLight sun;
     sun.node = "sun";
     sun.type = LightType::Directional;

@@ -28,9 +28,9 @@ TEST(WallCuts, RoomsWithADoorwayShareNoChartAtAnyDensity) {
     }
 }
 
-// A room whose walls end where the level does, on a floor as large: cut in the walls' middles alone. The room's own
-// floor is one chart, of two triangles whose common edge runs into the walls.
-TEST(WallCuts, TheFloorOfARoomIsOneChart) {
+// A room whose walls end where the level does, on a floor as large: behind them is no room, and they cut it in their
+// middles alone.
+TEST(WallCuts, WallsAtTheEndOfALevelAreNoSkins) {
     Scene scene;
     const uint32_t grey = addMaterial(scene, lambert(0.5f));
     const glm::vec3 half(2.05f, 1.5f, 3.1f);  // of the room; walls of 0.2 m
@@ -40,23 +40,13 @@ TEST(WallCuts, TheFloorOfARoomIsOneChart) {
     }
     addQuad(scene, "floor", {0, 0, 0}, {0, 0, half.z + 0.2f}, {half.x + 0.2f, 0, 0}, grey);
     cutAtWalls(scene, 4);
-    const RayScene rays(scene);
-    const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
-    ASSERT_TRUE(charts.has_value());
-    std::set<uint32_t> of_room;
-    for (uint32_t f = 0; f < charts->faces.size(); ++f) {
-        const uint32_t triangle = charts->faces[f].triangle;
-        if (scene.meshes[rays.triangles()[triangle].mesh].node != "floor") continue;
-        const glm::vec3 middle = rays.pointOn(triangle, 1.0f / 3, 1.0f / 3);
-        if (std::abs(middle.x) > half.x || std::abs(middle.z) > half.z) continue;
-        of_room.insert(charts->face_chart[f]);
-        for (int i = 0; i < 3; ++i) {
-            const glm::vec3 corner = rays.corner(triangle, i);
-            EXPECT_GT(std::abs(std::abs(corner.x) - half.x), 0.01f);
-            EXPECT_GT(std::abs(std::abs(corner.z) - half.z), 0.01f);
+    for (const SceneMesh& mesh : scene.meshes)
+        for (const glm::vec3 p : mesh.positions_m) {
+            const bool in_room = std::abs(p.x) < half.x + 0.05f && std::abs(p.z) < half.z + 0.05f;
+            if (mesh.node != "floor" || !in_room) continue;
+            EXPECT_GT(half.x - std::abs(p.x), 0.01f) << p.z;
+            EXPECT_GT(half.z - std::abs(p.z), 0.01f) << p.x;
         }
-    }
-    EXPECT_EQ(of_room.size(), 1u);
 }
 
 // A building that does not stand along the world's axes has its charts along its own: of floors too, which have no
