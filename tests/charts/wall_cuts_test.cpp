@@ -39,6 +39,7 @@ TEST(WallCuts, WallsAtTheEndOfALevelAreNoSkins) {
         addSolid(scene, "wall", {0, half.y, side * (half.z + 0.1f)}, {half.x + 0.2f, half.y, 0.1f}, grey);
     }
     addQuad(scene, "floor", {0, 0, 0}, {0, 0, half.z + 0.2f}, {half.x + 0.2f, 0, 0}, grey);
+    addSolid(scene, "ceiling", {0, 2 * half.y + 0.1f, 0}, {half.x + 0.2f, 0.1f, half.z + 0.2f}, grey);
     cutAtWalls(scene, 4);
     for (const SceneMesh& mesh : scene.meshes)
         for (const glm::vec3 p : mesh.positions_m) {
