@@ -2,6 +2,7 @@
 
 #include <charts/file_uv.h>
 #include <charts/planar.h>
+#include <charts/shared_edges.h>
 #include <charts/standing_walls.h>
 #include <charts/unwrap.h>
 #include <charts/wall_parts.h>
@@ -49,7 +50,9 @@ class WallCutter {
             }
         }
         markUncut();
+        const std::vector<CutMesh> beside = closedMeshes();
         for (const auto& [mesh, replacements] : by_mesh) rebuild(scene_.meshes[mesh], replacements);
+        splitSharedEdges(scene_, beside);
     }
 
    private:
@@ -81,6 +84,17 @@ class WallCutter {
                     if (++parts_of[face] > 1) scene_.meshes[sources_[face].mesh].uv1_crosses_walls = true;
             }
         }
+    }
+
+    // Those that cuts may change, before they do. A leaf's open and closed meshes stay alike.
+    std::vector<CutMesh> closedMeshes() const {
+        std::vector<CutMesh> meshes;
+        for (size_t f = 0; f < cuttable_; ++f) {
+            const uint32_t m = sources_[f].mesh;
+            if (scene_.meshes[m].door || (!meshes.empty() && meshes.back().mesh == m)) continue;
+            meshes.push_back({m, scene_.meshes[m].positions_m.size()});
+        }
+        return meshes;
     }
 
     struct Replacement {
