@@ -115,8 +115,7 @@ ChartFaults::Found ChartFaults::in(const JoinedCharts& joined) const {
         if (others.empty()) return;
         const FaceWalls walls = wallsOf(face, others, reach_m);
         for (const Part& other : others)
-            if ((!walls.none() && walls.from(faces_[other.face]) == FaceWalls::Parting::Wall) ||
-                besideWall(face, faces_[other.face]))
+            if ((!walls.none() && walls.part(faces_[other.face])) || besideWall(face, faces_[other.face]))
                 note(other.chart);
     });
     Found all;

@@ -25,10 +25,8 @@ FaceWalls::FaceWalls(const PlanarFace& face, const Axes& axes, const Reach& reac
       standing_(standing),
       shadows_(standing.triangles ? shadowsNear(standing) : std::nullopt) {}
 
-FaceWalls::Parting FaceWalls::from(const PlanarFace& other) const {
-    if (!mayPart(axes_.rectOf(face_), axes_.rectOf(other))) return Parting::None;
-    const Parting there = between(face_, other);
-    return there == Parting::Wall ? there : std::max(there, between(other, face_));
+bool FaceWalls::part(const PlanarFace& other) const {
+    return mayPart(axes_.rectOf(face_), axes_.rectOf(other)) && (between(face_, other) || between(other, face_));
 }
 
 std::optional<std::vector<Rect>> FaceWalls::shadowsNear(const Standing& standing) const {
@@ -80,8 +78,7 @@ bool FaceWalls::mayPart(Rect a, const Rect& b) const {
     return !shadows_ || std::ranges::any_of(*shadows_, [&](const Rect& shadow) { return shadow.touches(a); });
 }
 
-FaceWalls::Parting FaceWalls::between(const PlanarFace& a, const PlanarFace& b) const {
-    Parting parting = Parting::None;
+bool FaceWalls::between(const PlanarFace& a, const PlanarFace& b) const {
     for (size_t e = 0; e < 3; ++e)
         for (const float s : {0.02f, 0.25f, 0.5f, 0.75f}) {
             glm::vec3 p = glm::mix(a.corners_m[e], a.corners_m[(e + 1) % 3], s);
@@ -94,10 +91,11 @@ FaceWalls::Parting FaceWalls::between(const PlanarFace& a, const PlanarFace& b) 
             const glm::vec2 on_p = axes_.on(p), on_q = axes_.on(q);
             if (!mayPart({on_p, on_p}, {on_q, on_q})) continue;
             if (!wallBetween(p, q)) continue;
-            if (wallBetween(outOfWalls(p, a), outOfWalls(q, b))) return Parting::Wall;
-            parting = Parting::FromWithin;
+            if (!isInWall(p) && !isInWall(q)) return true;
+            const auto from = outOfWalls(p, a), to = outOfWalls(q, b);
+            if (wallBetween(from[0], to[0]) && wallBetween(from[1], to[1])) return true;
         }
-    return parting;
+    return false;
 }
 
 bool FaceWalls::wallBetween(glm::vec3 p, glm::vec3 q) const {
@@ -107,14 +105,20 @@ bool FaceWalls::wallBetween(glm::vec3 p, glm::vec3 q) const {
     });
 }
 
-// The first place on the way to the face's middle that is in the open, if there is one.
-glm::vec3 FaceWalls::outOfWalls(glm::vec3 p, const PlanarFace& face) const {
-    if (!standing_.inside) return p;
-    for (const float share : {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f}) {
-        const glm::vec3 at = glm::mix(p, middleOf(face), share);
-        if (!standing_.inside(at + lift(wall_probe_low_m), axes_)) return at;
-    }
-    return p;
+bool FaceWalls::isInWall(glm::vec3 p) const {
+    return standing_.inside && standing_.inside(p + lift(wall_probe_low_m), axes_);
+}
+
+// Two places on the way to the face's middle, of which the first is where the open begins. A face goes on to the middle
+// of the wall that it was cut at, and from in there the rest of its own room is beyond the wall; from where the open
+// begins it may be behind the wall's end.
+std::array<glm::vec3, 2> FaceWalls::outOfWalls(glm::vec3 p, const PlanarFace& face) const {
+    constexpr std::array shares = {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f};
+    const auto at = [&](size_t i) { return glm::mix(p, middleOf(face), shares[std::min(i, shares.size() - 1)]); };
+    size_t open = 0;
+    while (open < shares.size() && isInWall(at(open))) ++open;
+    if (open == shares.size()) return {p, p};
+    return {at(open), at(open + 2)};
 }
 
 glm::vec3 FaceWalls::lift(float height_m) const {

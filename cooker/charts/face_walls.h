@@ -5,6 +5,7 @@
 #include <charts/planar.h>
 #include <charts/polygon.h>
 
+#include <array>
 #include <optional>
 #include <vector>
 
@@ -31,22 +32,17 @@ class FaceWalls {
 
     // Nothing stands where a wall would.
     bool none() const { return shadows_ && shadows_->empty(); }
-    enum class Parting {
-        None,
-        // Of what lies in half of a wall itself: a face goes on to the middle of the wall that it was cut at, and from
-        // in there the rest of its own room is beyond the wall.
-        FromWithin,
-        Wall
-    };
-    Parting from(const PlanarFace& other) const;
+    // A wall stands between the open of the face and that of the other one.
+    bool part(const PlanarFace& other) const;
 
    private:
     std::optional<std::vector<Rect>> shadowsNear(const Standing& standing) const;
     Rect shadowBetween(const std::array<glm::vec3, 3>& triangle, float low, float high) const;
     bool mayPart(Rect a, const Rect& b) const;
-    Parting between(const PlanarFace& a, const PlanarFace& b) const;
+    bool between(const PlanarFace& a, const PlanarFace& b) const;
     bool wallBetween(glm::vec3 p, glm::vec3 q) const;
-    glm::vec3 outOfWalls(glm::vec3 p, const PlanarFace& face) const;
+    bool isInWall(glm::vec3 p) const;
+    std::array<glm::vec3, 2> outOfWalls(glm::vec3 p, const PlanarFace& face) const;
     glm::vec3 lift(float height_m) const;
 
     const PlanarFace& face_;

@@ -253,14 +253,12 @@ class PlaneGrouper {
             const glm::vec2 size_m = rectOf(i).max - rectOf(i).min;
             reach.largest_m = std::max({reach.largest_m, size_m.x, size_m.y});
         }
-        // From within one as well: smaller charts have texels that line up with what they end at.
         std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
         tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
             const FaceWalls walls(all_[ids_[a]], axes_, reach, standing);
             if (walls.none()) return;
             for (const uint32_t b : boxes_.touching(boxOf(a, reach.near_m + touching_m)))
-                if (a < b && root[a] == root[b] && near(a, b, reach.near_m) &&
-                    walls.from(all_[ids_[b]]) != FaceWalls::Parting::None)
+                if (a < b && root[a] == root[b] && near(a, b, reach.near_m) && walls.part(all_[ids_[b]]))
                     beyond_walls[a].push_back(b);
         });
         for (uint32_t a = 0; a < ids_.size(); ++a)

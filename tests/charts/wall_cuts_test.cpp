@@ -28,6 +28,30 @@ TEST(WallCuts, RoomsWithADoorwayShareNoChartAtAnyDensity) {
     }
 }
 
+// Each part of a floor goes on to the middle of its walls. From in there its own room is beyond a wall; it is one chart
+// all the same, as another would be filtered apart: a step of light across the room.
+TEST(WallCuts, ARoomsFloorIsOneChart) {
+    for (const float density : {4.0f, 8.0f}) {
+        SCOPED_TRACE(density);
+        Scene scene = twoRooms();
+        cutAtWalls(scene, density);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = density, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 4);
+        std::set<uint32_t> left, right;
+        for (size_t i = 0; i < texels.size(); ++i)
+            for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
+                const uint32_t face = texels.sample(i, s).face;
+                const glm::vec3 p = samplePoint(rays, *charts, texels, i, s).position_m;
+                const bool on_floor = std::abs(p.y) < 0.05f && charts->frames[face].normal.y > 0.9f;
+                if (on_floor && std::abs(p.x) > half_wall_m) (p.x < 0 ? left : right).insert(charts->face_chart[face]);
+            }
+        EXPECT_EQ(left.size(), 1u);
+        EXPECT_EQ(right.size(), 1u);
+    }
+}
+
 // A room whose walls end where the level does, on a floor as large: behind them is no room, and they cut it in their
 // middles alone.
 TEST(WallCuts, WallsAtTheEndOfALevelAreNoSkins) {
