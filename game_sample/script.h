@@ -12,6 +12,7 @@
 //     at FRAME set STATE                           hall=0.5,alarm=1/0.2/0.2,door:front=1,all=0; may be in quotes
 //     at FRAME fade NAME FROM TO over FRAMES       a light set, weights scalar or r/g/b, or door:NAME, 0..1
 //     at FRAME flicker NAME LOW HIGH for FRAMES seed N    times the weight that the set has then, 0..1
+//                                                  a later command about a set or door ends what runs there
 //     at FRAME camera VIEW                         a cut: the eye has adapted to the new view
 //     at FRAME move VIEW over FRAMES               a smooth move from the present view
 //

@@ -1,5 +1,6 @@
 #include "timeline.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace dimmer::sample {
@@ -24,6 +25,34 @@ Expected<void> setElement(LightState& lights, std::string_view element, const We
 // 0 at the step's first frame, 1 at its last and after.
 float progress(uint32_t frame, uint32_t first, uint32_t frames) {
     return frame - first >= frames ? 1.0f : static_cast<float>(frame - first) / static_cast<float>(frames);
+}
+
+// What a fade or a flicker is about; empty for what does not last, and for moves.
+std::string_view elementOf(const Step& step) {
+    if (const auto* fade = std::get_if<Fade>(&step.action)) return fade->element;
+    if (const auto* flicker = std::get_if<Flicker>(&step.action)) return flicker->set;
+    return {};
+}
+
+// Of a state as LightState::apply() takes it: "hall=0.5, door:front=1"; "all" is every set.
+bool names(std::string_view state, std::string_view element) {
+    while (!state.empty()) {
+        const std::string_view part = state.substr(0, state.find(','));
+        state.remove_prefix(std::min(part.size() + 1, state.size()));
+        std::string_view name = part.substr(0, part.find('='));
+        name.remove_prefix(std::min(name.find_first_not_of(' '), name.size()));
+        name = name.substr(0, name.find_last_not_of(' ') + 1);
+        if (name == element || (name == "all" && !element.starts_with(door_prefix))) return true;
+    }
+    return false;
+}
+
+// A later step about the same set or door: the earlier one would go on writing over it.
+bool ends(const Step& later, const Step& running) {
+    const std::string_view element = elementOf(running);
+    if (element.empty()) return false;
+    const auto* set = std::get_if<SetState>(&later.action);
+    return set ? names(set->state, element) : elementOf(later) == element;
 }
 
 bool touchesLights(const Step& step) {
@@ -62,6 +91,7 @@ Expected<std::vector<std::string>> Timeline::advance(uint32_t frame, LightState&
 }
 
 Expected<void> Timeline::begin(const Step& step, LightState& lights) {
+    std::erase_if(running_, [&](const Running& r) { return ends(step, *r.step); });
     if (const auto* set = std::get_if<SetState>(&step.action)) return lights.apply(set->state);
     if (const auto* camera = std::get_if<CameraCut>(&step.action)) {
         std::erase_if(running_, [](const Running& r) { return std::holds_alternative<CameraMove>(r.step->action); });

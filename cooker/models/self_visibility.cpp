@@ -43,7 +43,7 @@ class TransferTracer {
         findIncident();
     }
 
-    ModelTransfers run() {
+    ModelTransfers run(Progress& progress) {
         for (const SceneMesh& mesh : own_.meshes) now_.emplace_back(mesh.positions_m.size());
         for (int bounce = 0; bounce <= bounces; ++bounce) {
             ModelTransfers next = now_;
@@ -52,6 +52,7 @@ class TransferTracer {
                 auto& sides = next[m][v];
                 sides[0] = at(m, v, false, static_cast<uint32_t>(i));
                 sides[1] = isDoubleSided(m) ? at(m, v, true, static_cast<uint32_t>(i)) : sides[0];
+                progress.advance(1);
             });
             now_ = std::move(next);
         }
@@ -155,18 +156,30 @@ class TransferTracer {
 
 }  // namespace
 
-ModelTransfers selfVisibility(const Scene& scene, const SceneModel& model) {
-    return TransferTracer(scene, model).run();
+ModelTransfers selfVisibility(const Scene& scene, const SceneModel& model, Progress& progress) {
+    return TransferTracer(scene, model).run(progress);
 }
 
-void findTransfers(Scene& scene) {
-    std::map<ModelShape, std::shared_ptr<const ModelTransfers>> known;
+void findTransfers(Scene& scene, Progress& progress) {
+    std::vector<std::pair<SceneModel*, std::vector<SceneModel*>>> shapes;  // of each, its first model and the others
+    std::map<ModelShape, size_t> known;
+    uint64_t steps = 0;
     for (SceneModel& model : scene.models) {
         if (model.meshes.empty()) continue;
         const auto shape = shapeOf(scene, model);
-        std::shared_ptr<const ModelTransfers> own, &transfers = shape ? known[*shape] : own;
-        if (!transfers) transfers = std::make_shared<const ModelTransfers>(selfVisibility(scene, model));
-        model.transfers = transfers;
+        const auto [it, fresh] = shape ? known.try_emplace(*shape, shapes.size()) : std::pair(known.end(), true);
+        if (!fresh) {
+            shapes[it->second].second.push_back(&model);
+            continue;
+        }
+        shapes.push_back({&model, {}});
+        for (const uint32_t m : model.meshes) steps += scene.meshes[m].positions_m.size() * (bounces + 1);
+    }
+    if (shapes.empty()) return;
+    progress.stage("models' own shadows", steps);
+    for (auto& [first, others] : shapes) {
+        first->transfers = std::make_shared<const ModelTransfers>(selfVisibility(scene, *first, progress));
+        for (SceneModel* other : others) other->transfers = first->transfers;
     }
 }
 

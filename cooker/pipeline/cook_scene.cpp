@@ -62,6 +62,8 @@ void warnOfPlaces(const Receivers& at, CookStats& stats) {
     if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
     if (auto warning = tooSmallForTexels(*level.rays, level.charts, at.texels))
         stats.warnings.push_back(std::move(*warning));
+    if (auto warning = tooLargeForTexels(*level.rays, level.charts, at.texels))
+        stats.warnings.push_back(std::move(*warning));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));
@@ -119,12 +121,14 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     ChartedLevel& level = at.level;
     {
         const Stopwatch watch(stats.seconds["charts"]);
-        progress.stage("charts", 2);
+        progress.stage("charts", 1);
         if (auto ok = findReceivers(profile, *quality, cache, at); !ok) return std::unexpected(ok.error());
         progress.advance(1);
-        findTransfers(level.scene);
         warnOfPlaces(at, stats);
-        progress.advance(1);
+    }
+    if (std::ranges::any_of(level.scene.models, [](const SceneModel& model) { return !model.meshes.empty(); })) {
+        const Stopwatch watch(stats.seconds["models"]);
+        findTransfers(level.scene, progress);
     }
     if (at.texels.size() == 0)
         return fail(ErrorCode::BadInput, level.scene.file +

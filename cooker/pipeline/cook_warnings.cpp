@@ -102,6 +102,16 @@ std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap&
         scene.file, few_texels);
 }
 
+std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
+    constexpr size_t texels_min = 1'000'000, texels_per_face = 10'000;  // of real levels' faces: hundreds
+    if (texels.size() < texels_min || texels.size() / unwrap.faces.size() < texels_per_face) return {};
+    const glm::vec3 size = rays.boundsMax() - rays.boundsMin();
+    return fmt::format(
+        "{}: is {:.0f} x {:.0f} x {:.0f} m large and has {:.1f} million texels on {} faces: is it in metres, as glTF "
+        "has it? If so, give its largest nodes fewer texels ('dimmer_texel_density')",
+        rays.scene().file, size.x, size.y, size.z, static_cast<double>(texels.size()) * 1e-6, unwrap.faces.size());
+}
+
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {
     std::vector<std::string> warnings;
     for (const auto& [key, origin] : profile.origin)

@@ -40,9 +40,8 @@ class Checker {
     explicit Checker(const ImportContext& context) : context_(context), model_(context.model) {}
 
     Expected<void> run() {
-        for (const auto step :
-             {&Checker::extensions, &Checker::bufferViews, &Checker::accessors, &Checker::images, &Checker::materials,
-              &Checker::meshes, &Checker::nodes, &Checker::tree, &Checker::scenes})
+        for (const auto step : {&Checker::bufferViews, &Checker::accessors, &Checker::images, &Checker::materials,
+                                &Checker::meshes, &Checker::nodes, &Checker::tree, &Checker::scenes})
             if (const Expected<void> done = (this->*step)(); !done) return done;
         return {};
     }
@@ -58,16 +57,6 @@ class Checker {
     Expected<void> optionalIndex(int value, const std::vector<T>& all, const std::string& owner,
                                  std::string_view what) const {
         return value == -1 ? Expected<void>() : index(value, all, owner, what);
-    }
-
-    Expected<void> extensions() {
-        for (const std::string& name : model_.extensionsRequired)
-            if (std::ranges::count(known_extensions, name) == 0)
-                return context_.error("extensionsRequired",
-                                      fmt::format("needs the extension '{}', which is not supported. Export the level "
-                                                  "without it.",
-                                                  name));
-        return {};
     }
 
     Expected<void> bufferViews() {
@@ -221,10 +210,13 @@ Expected<void> checkModel(const ImportContext& context) {
     return Checker(context).run();
 }
 
+bool isKnownExtension(std::string_view name) {
+    return std::ranges::count(known_extensions, name) > 0;
+}
+
 void warnOfExtensions(ImportContext& context) {
     for (const std::string& name : context.model.extensionsUsed) {
-        if (std::ranges::count(known_extensions, name) > 0 || std::ranges::count(harmless_extensions, name) > 0)
-            continue;
+        if (isKnownExtension(name) || std::ranges::count(harmless_extensions, name) > 0) continue;
         const auto lossy = std::ranges::find(lossy_extensions, name, &IgnoredExtension::name);
         context.warn(
             "extensionsUsed",

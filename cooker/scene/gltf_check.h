@@ -6,8 +6,11 @@
 namespace dimmer::cook {
 
 // Every index is in range, every buffer view inside its buffer, every node has one parent and no node is its own
-// ancestor, and every required extension is known. Accessors are checked where they are read (accessor.h).
+// ancestor. Accessors are checked where they are read (accessor.h).
 Expected<void> checkModel(const ImportContext& context);
+
+// One that the cooker reads.
+bool isKnownExtension(std::string_view name);
 
 // Warns of extensions that are used, and ignored at a loss.
 void warnOfExtensions(ImportContext& context);

@@ -365,12 +365,22 @@ class LevelImporter {
                                                  set, material));
     }
 
+    static bool isInReach(const PlacedNode& at) {
+        return glm::length(glm::dvec3(at.world_from_node[3])) <= coordinate_max_m;
+    }
+    static std::string farAway(std::string_view what) {
+        return fmt::format("{} more than {:.0f} km from the origin. Correct its translation.", what,
+                           coordinate_max_m / 1000);
+    }
+
     // A node with a profile may carry a punctual light besides, for programs that do not read profiles.
     Expected<void> light(const PlacedNode& at, std::optional<int> punctual, const Extras& extras) {
         const bool profile = hasLightProfile(model_.nodes[static_cast<size_t>(at.node)]);
         Expected<PunctualLight> light = profile ? profiles_.place(at.node, at.world_from_node)
                                                 : importLight(context_, *punctual, at.node, at.world_from_node);
         if (!light) return std::unexpected(light.error());
+        if (light->type != LightType::Directional && !isInReach(at))
+            return context_.error(context_.nodeLabel(at.node), farAway("its light is"));
         light->node = nodeName(at.node);
         const auto bake = extras.choice("dimmer_bake", {bake_modes.begin(), bake_modes.end()});
         if (!bake) return std::unexpected(bake.error());
@@ -391,10 +401,7 @@ class LevelImporter {
         if (!dynamic) return std::unexpected(dynamic.error());
         if (*dynamic != Lighting::Dynamic) return {};
         if (at.singular != -1) return singular(at, owner);
-        if (!(glm::length(glm::dvec3(at.world_from_node[3])) <= coordinate_max_m))
-            return context_.error(owner, fmt::format("is a place for what moves, more than {:.0f} km from the origin. "
-                                                     "Correct its translation.",
-                                                     coordinate_max_m / 1000));
+        if (!isInReach(at)) return context_.error(owner, farAway("is a place for what moves,"));
         scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
         return {};
     }

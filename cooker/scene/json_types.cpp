@@ -1,6 +1,7 @@
 #include <scene/json_types.h>
 
 #include <fmt/format.h>
+#include <scene/gltf_check.h>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -124,11 +125,12 @@ class TypeChecker {
     Expected<void> run() {
         static constexpr Rule of_root[] = {{"scene", Kind::Index}};
         object(root_, "the file", of_root);
+        requiredExtensions();
         if (const auto ies = memberOf(memberOf(&root_, "extensions"), "EXT_lights_ies"))
             ints(*ies, "EXT_lights_ies", "the file");
         if (const auto punctual = memberOf(memberOf(&root_, "extensions"), "KHR_lights_punctual"))
             forEach(*punctual, "lights", "light", of_light,
-                    [&](const json& light, const std::string& owner) { inner(light, "spot", owner, of_spot); });
+                    [&](const json& light, const std::string& owner) { spot(light, owner); });
         forEach("scenes", "scene", of_scene);
         forEach("nodes", "node", of_node);
         forEach("accessors", "accessor", of_accessor, [&](const json& accessor, const std::string& owner) {
@@ -192,6 +194,28 @@ class TypeChecker {
     }
     void forEach(const char* list, const char* what, std::span<const Rule> rules, auto&&... more) {
         forEach(root_, list, what, rules, more...);
+    }
+    // The parser would miss what the extension has instead: accessors without a buffer view, of compressed meshes.
+    void requiredExtensions() {
+        const json* names = memberOf(&root_, "extensionsRequired");
+        if (!names || !names->is_array()) return;
+        for (const json& name : *names) {
+            if (!name.is_string() || isKnownExtension(name.get<std::string>()) || !problem_.empty()) continue;
+            const auto extension = name.get<std::string>();
+            const bool compressed = extension.ends_with("_compression");
+            problem_ = fmt::format(
+                "{}: extensionsRequired: needs the extension '{}', which is not supported. Export the level without "
+                "it{}.",
+                file_, extension, compressed ? " (in most exporters an option named compression)" : "");
+        }
+    }
+    void spot(const json& light, const std::string& owner) {
+        inner(light, "spot", owner, of_spot);
+        const json *type = memberOf(&light, "type"), *spot = memberOf(&light, "spot");
+        if (type && *type == "spot" && !spot && problem_.empty())
+            problem_ = fmt::format(
+                "{}: {}: is of type spot and has no 'spot' with its cone. Give it one, or make it a point light.",
+                file_, owner);
     }
     // Null where there is none.
     const json* itemOf(const char* list, const json* index) const {

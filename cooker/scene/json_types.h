@@ -1,4 +1,5 @@
-// What the parser passes over: values of the wrong type, which it takes for absent ones.
+// What the parser passes over or has no words for: values of the wrong type, which it takes for absent ones, and
+// extensions that the file requires.
 #pragma once
 
 #include <dimmer/error.h>

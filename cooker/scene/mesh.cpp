@@ -12,6 +12,8 @@ constexpr size_t triangles_max = size_t{1} << 25;
 
 // Height over longest edge below which a triangle has no usable plane in floats.
 constexpr double sliver_height = 1e-7;
+// Smaller ones have areas and normals that floats round to nothing; no texel nor probe would tell them from a point.
+constexpr double longest_edge_min_m = 1e-6;
 
 // Appends primitives to one SceneMesh in world space, keeping only the vertices that triangles use.
 class MeshBuilder {
@@ -93,7 +95,8 @@ class MeshBuilder {
         const glm::dvec3 cross = glm::cross(b - a, c - a);  // length: longest edge times height
         const double longest2 = std::max({glm::dot(b - a, b - a), glm::dot(c - b, c - b), glm::dot(a - c, a - c)});
         const double length = glm::length(cross);
-        if (!(length > sliver_height * longest2)) return std::nullopt;
+        if (!(length > sliver_height * longest2) || longest2 < longest_edge_min_m * longest_edge_min_m)
+            return std::nullopt;
         return glm::vec3(cross / length);
     }
 

@@ -12,10 +12,12 @@
 
 namespace dimmer::cook::test {
 
+inline SilentProgress no_progress;
+
 struct BakedScene {
     explicit BakedScene(const Scene& scene_in, float texels_per_metre = 4, uint32_t samples = 4)
         : scene(scene_in), rays(std::make_unique<RayScene>(scene)) {
-        findTransfers(scene);
+        findTransfers(scene, no_progress);
         auto unwrapped = unwrap(*rays, {.texels_per_metre = texels_per_metre, .page_size = 2048});
         if (!unwrapped) {
             ADD_FAILURE() << unwrapped.error().message;
@@ -28,8 +30,7 @@ struct BakedScene {
     BakedScene& operator=(const BakedScene&) = delete;
 
     void bake(const BakeSettings& settings) {
-        SilentProgress quiet;
-        baked = cook::bake(*rays, charts, texels, settings, quiet);
+        baked = cook::bake(*rays, charts, texels, settings, no_progress);
     }
     // Of one term at a receiver; nothing stored is darkness.
     glm::vec3 lux(size_t receiver, uint32_t term = always_group) const {

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <pack/pack_data.h>
 
+#include <fmt/format.h>
+
 #include <set>
 
 namespace dimmer::sample {
@@ -75,6 +77,27 @@ TEST_F(TimelineTest, FlickerStaysWithinItsRangeOfTheWeightAndGivesItBack) {
              reds.insert(hall().r);
          });
     EXPECT_GT(reds.size(), 15u);
+}
+
+// A lamp that is shot out while it flickers or fades stays dark, and of two fades the earlier does not come back.
+TEST_F(TimelineTest, ALaterCommandEndsWhatRunsThere) {
+    for (const char* running : {"flicker hall 0.5 1 for 20 seed 3", "fade hall 1 0.5 over 20"})
+        for (const char* shot : {"set hall=0", "set door:front=1, hall=0", "set all=0", "fade hall 0 0 over 2"}) {
+            SCOPED_TRACE(shot);
+            play(fmt::format("at 1 {}\nat 5 {}", running, shot), 30,
+                 [&](uint32_t frame, const Timeline&, const auto& changes) {
+                     EXPECT_EQ(frame >= 5, hall() == Weight(0)) << frame;
+                     if (frame == 1 || frame == 4) {
+                         EXPECT_EQ(changes.size(), 1u);
+                     } else if (frame > 7) {
+                         EXPECT_TRUE(changes.empty());
+                     }
+                 });
+            lights_.apply("all=1,door:front=0").value();
+        }
+    play("at 0 fade door:front 0 1 over 10\nat 5 set all=0", 10, [&](uint32_t frame, const Timeline&, const auto&) {
+        EXPECT_EQ(lights_.open(*lights_.door("front")), static_cast<float>(frame) / 10);  // no set
+    });
 }
 
 TEST_F(TimelineTest, FlickerNoiseIsUniformAndDependsOnItsSeed) {

@@ -101,7 +101,7 @@ TEST(SelfVisibility, AConvexModelHidesNothing) {
     Scene scene;
     addCrate(scene, "crate", placed({3, 1, 2}, 0.4), {0.5f, 0.3f, 0.2f}, addMaterial(scene, lambert(0.5f)));
     listModels(scene, {});
-    const auto transfers = selfVisibility(scene, scene.models[0]);
+    const auto transfers = selfVisibility(scene, scene.models[0], no_progress);
     const SceneMesh& mesh = scene.meshes[0];
     for (size_t i = 0; i < mesh.positions_m.size(); ++i) {
         const glm::vec3 n = glm::transpose(scene.models[0].world_from_model) * mesh.normals[i];
@@ -131,7 +131,7 @@ Scene lidded(float rho) {
 
 TEST(SelfVisibility, ALidHidesWhatItsFormFactorSays) {
     const Scene scene = lidded(0);
-    const auto transfers = selfVisibility(scene, scene.models[0]);
+    const auto transfers = selfVisibility(scene, scene.models[0], no_progress);
     // Four corners of 1 m x 1 m at 0.5 m.
     const double seen = 1 - 4 * cornerFormFactor(1, 1, 0.5);
     // 512 rays of a low-discrepancy sequence: well within 1/22, the error of random ones.
@@ -141,7 +141,7 @@ TEST(SelfVisibility, ALidHidesWhatItsFormFactorSays) {
 // The lid's own light is the whole lobe's (the tile is a speck): it throws back rho of it.
 TEST(SelfVisibility, ALidThrowsBackWhatItReflects) {
     const Scene scene = lidded(0.6f);
-    const auto transfers = selfVisibility(scene, scene.models[0]);
+    const auto transfers = selfVisibility(scene, scene.models[0], no_progress);
     const double hidden = 4 * cornerFormFactor(1, 1, 0.5);
     for (const auto& vertex : transfers[1]) EXPECT_NEAR(evenShare(vertex[0]), 1 - hidden + 0.6 * hidden, 0.01);
 }
@@ -153,7 +153,7 @@ TEST(ModelMesh, InstancesOfOneSizeShareTheirMesh) {
     scene.dynamic_places.push_back({"place", placed({1, 2, 3})});
     listModels(scene, {});
     PackData pack;
-    findTransfers(scene);
+    findTransfers(scene, no_progress);
     describeModels(scene, {}, pack);
     ASSERT_EQ(pack.models.size(), 5u);
     EXPECT_EQ(pack.model_meshes.size(), 3u);

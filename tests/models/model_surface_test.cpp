@@ -15,7 +15,7 @@ Scene crateIn(float room_half_m) {
     addBox(scene, glm::vec3(room_half_m), grey);
     addCrate(scene, "crate", placed({0.1, 0.2, 0}, 0.4), {0.5f, 0.25f, 1}, grey);
     listModels(scene, {});
-    findTransfers(scene);
+    findTransfers(scene, no_progress);
     return scene;
 }
 
@@ -68,7 +68,7 @@ TEST(ModelPlaces, NoneLieInsideOfTheModelItself) {
     addCrate(scene, "post", placed({0, 0.5, 0}), {0.1f, 1, 0.1f}, grey).gltf_node = 1;
     listModels(scene, {});
     ASSERT_EQ(scene.models.size(), 1u);
-    findTransfers(scene);
+    findTransfers(scene, no_progress);
     const RayScene rays(scene);
     const auto places = modelPlaces(rays, 0, 300);
     EXPECT_EQ(places.size(), 300u);
@@ -85,7 +85,7 @@ TEST(ModelPlaces, WhatIsDoubleSidedHasPlacesOnBothSides) {
     addBox(scene, {3, 3, 3}, grey);
     addQuad(scene, "curtain", {-0.5f, -0.5f, 0}, {1, 0, 0}, {0, 1, 0}, cloth).lighting = Lighting::LocalGrid;
     listModels(scene, {});
-    findTransfers(scene);
+    findTransfers(scene, no_progress);
     const RayScene rays(scene);
     size_t front = 0;
     const auto places = modelPlaces(rays, 0, 400);
@@ -130,7 +130,7 @@ TEST(FindTransfers, ModelsOfOneShapeShareTheirs) {
     scene.light_sets.push_back({"lamps", 1});
     scene.meshes[1].light_set = 0;
     listModels(scene, {});
-    findTransfers(scene);
+    findTransfers(scene, no_progress);
     ASSERT_EQ(scene.models.size(), 3u);
     ASSERT_TRUE(scene.models[0].transfers);
     EXPECT_EQ(scene.models[0].transfers, scene.models[1].transfers);

@@ -383,12 +383,33 @@ TEST(SceneBadInput, Transforms) {
     expectBadInput(far.import(), {"node 'spawn'", "1000 km"});
 }
 
+// Rays from a billion kilometres away have no direction in floats: the cook aborted. The sun's place means nothing.
+TEST(SceneBadInput, LightsFarAwayAreRefused) {
+    for (const char* type : {"point", "spot", "directional"}) {
+        SCOPED_TRACE(type);
+        LevelFile level = LevelFile::withFloor();
+        json light = {{"type", type}, {"intensity", 100}};
+        if (light["type"] == "spot") light["spot"] = json::object();
+        level.node(level.addLight("star", light))["translation"] = {0, 1e19, 0};
+        if (light["type"] == "directional")
+            ASSERT_IMPORTED(level.import());
+        else
+            expectBadInput(level.import(), {"node 'star'", "light", "1000 km"});
+    }
+}
+
 TEST(SceneBadInput, RequiredExtensionsMustBeKnown) {
     LevelFile level = LevelFile::withFloor();
     level.document["extensionsUsed"] = {"KHR_draco_mesh_compression"};
     ASSERT_IMPORTED(level.import());
     level.document["extensionsRequired"] = {"KHR_draco_mesh_compression"};
     expectBadInput(level.import(), {"KHR_draco_mesh_compression"});
+    // As exporters write it: the parser refuses what has no buffer view, before anybody asks why.
+    for (json& accessor : level.document["accessors"]) accessor.erase("bufferView");
+    expectBadInput(level.import(), {"KHR_draco_mesh_compression", "compression)"});
+    level.document["extensionsRequired"] = {7, "KHR_lights_punctual"};
+    level.document["accessors"] = LevelFile::withFloor().document["accessors"];
+    ASSERT_IMPORTED(level.import());
 }
 
 TEST(SceneBadInput, ExtensionsThatAreMissedAreWarnedOf) {

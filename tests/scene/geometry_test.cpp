@@ -281,6 +281,21 @@ TEST(SceneGeometry, DegenerateTrianglesAreDropped) {
     expectWarning(*scene, {"node 'sliver'", "2 triangles without area"});
 }
 
+// What floats round to a point took a page of texels, and its normals were none.
+TEST(SceneGeometry, TrianglesOfLessThanAMicrometreAreDropped) {
+    for (const float side_m : {1e-3f, 1e-5f, 1e-7f, 1e-13f, 1e-20f, 1e-30f}) {
+        SCOPED_TRACE(side_m);
+        LevelFile level = LevelFile::withFloor();
+        level.addNode({{"name", "speck"},
+                       {"mesh", level.addMesh({{0, 0, 0}, {side_m, 0, 0}, {0, side_m, 0}},
+                                              std::vector(3, glm::vec3(0, 0, 1)), {0, 1, 2}, 0)}});
+        const auto scene = level.import();
+        ASSERT_IMPORTED(scene);
+        EXPECT_EQ(scene->meshes.size(), side_m >= 1e-5f ? 2u : 1u);
+        if (scene->meshes.size() == 1) expectWarning(*scene, {"node 'speck'", "1 triangles without area"});
+    }
+}
+
 TEST(SceneGeometry, ThinTrianglesOfRealLevelsStay) {
     LevelFile level = LevelFile::withFloor();
     const int mesh = level.addMesh({{0, 0, 0}, {16, 0, 0}, {16, 0.001f, 0}}, {}, {0, 1, 2}, 0);

@@ -86,6 +86,9 @@ TEST(SceneLights, ValuesOfTheWrongTypeAreRefused) {
         SCOPED_TRACE(value.dump());
         expectBadInput(level.import(), {"light 0", std::string("'") + key + "'"});
     }
+    LevelFile without_cone = LevelFile::withFloor();
+    without_cone.addLight("lamp", {{"type", "spot"}});
+    expectBadInput(without_cone.import(), {"light 0", "'spot'", "point"});
     for (const char* angle : {"innerConeAngle", "outerConeAngle"}) {
         LevelFile level = LevelFile::withFloor();
         level.addLight("lamp", {{"type", "spot"}, {"spot", {{angle, "0.2"}}}});

@@ -27,8 +27,8 @@ struct Door {
 };
 
 // Without a runtime. NotFound names the nearest.
-Expected<LightSet> findLightSet(const Pack& pack, std::string_view name);
-Expected<Door> findDoor(const Pack& pack, std::string_view name);
+[[nodiscard]] Expected<LightSet> findLightSet(const Pack& pack, std::string_view name);
+[[nodiscard]] Expected<Door> findDoor(const Pack& pack, std::string_view name);
 
 // How strongly a light set shines, per linear Rec.709 channel; 1 is as baked. A scalar dims, three numbers recolour.
 struct Weight {
@@ -57,32 +57,32 @@ struct UpdateLimits {
 // smaller) and every door is closed.
 class LightState {
    public:
-    Expected<LightSet> lightSet(std::string_view name) const;
-    Expected<Door> door(std::string_view name) const;
+    [[nodiscard]] Expected<LightSet> lightSet(std::string_view name) const;
+    [[nodiscard]] Expected<Door> door(std::string_view name) const;
 
     // Refused, with nothing changed, when a channel is NaN, infinite, negative or above the set's maximum, and, unless
     // it is 0, for a set whose records are not loaded (Runtime::dropRecords).
-    Expected<void> setWeight(LightSet set, Weight weight);
+    [[nodiscard]] Expected<void> setWeight(LightSet set, Weight weight);
     // `open`: 0 closed .. 1 open.
-    Expected<void> setDoor(Door door, float open);
+    [[nodiscard]] Expected<void> setDoor(Door door, float open);
     // All at once, e.g. "hall=0.5,alarm=1/0.2/0.2,door:front=1"; "all=0" sets every light set first, wherever it is
     // written (sets whose records are not loaded stay at 0). What is not named keeps its weight. On an error nothing
     // has changed.
-    Expected<void> apply(std::string_view state);
+    [[nodiscard]] Expected<void> apply(std::string_view state);
     // Takes effect with the next update; 0 and 0 bring the exact state with it. The first call that sets a limit costs
     // a pass over the pack's records. Refused: a tolerance that is negative or not finite.
-    Expected<void> setLimits(const UpdateLimits& limits);
+    [[nodiscard]] Expected<void> setLimits(const UpdateLimits& limits);
 
     // A thing that moves gets probes of its own, as many as its grid says, taken from the level's global grid by the
     // next update, and again whenever it moved or the light around it changed. Refused, with nothing changed: a grid or
     // transform that is not finite, a singular transform; Unsupported where the pack has no global grid; OutOfMemory
     // where no free range of moving_probes_max is long enough for its probes, in multiples of 8. Constant time but for
     // the number of models.
-    Expected<Model> addModel(const ModelGrid& grid, const Transform& transform);
-    Expected<void> moveModel(Model model, const Transform& transform);
-    Expected<void> removeModel(Model model);
+    [[nodiscard]] Expected<Model> addModel(const ModelGrid& grid, const Transform& transform);
+    [[nodiscard]] Expected<void> moveModel(Model model, const Transform& transform);
+    [[nodiscard]] Expected<void> removeModel(Model model);
     // For shading; changes with the transform alone.
-    Expected<ModelSlot> modelSlot(Model model) const;
+    [[nodiscard]] Expected<ModelSlot> modelSlot(Model model) const;
 
     Weight weight(LightSet set) const;
     float open(Door door) const;
@@ -105,11 +105,11 @@ class LightState {
     const ModelSlots& models() const { return *models_; }
     // A held set is at 0 and refuses other weights: its records are not there. Released, it is still at 0.
     void hold(LightSet set, bool held);
-    Expected<void> checkSet(LightSet set) const;
+    [[nodiscard]] Expected<void> checkSet(LightSet set) const;
 
    private:
     void setElement(uint32_t element, Weight weight);
-    Expected<void> checkHeld(uint32_t element, const Weight& weight) const;
+    [[nodiscard]] Expected<void> checkHeld(uint32_t element, const Weight& weight) const;
 
     Pack pack_;
     std::vector<std::unique_ptr<Planner>> planners_, probe_planners_;

@@ -81,11 +81,11 @@ class Pack {
    public:
     // Reads, decompresses and validates a whole file. Cost: one pass over the file, and in memory what it holds and,
     // until it is there, one chunk of it. Errors name the chunk.
-    static Expected<Pack> open(const std::filesystem::path& path);
+    [[nodiscard]] static Expected<Pack> open(const std::filesystem::path& path);
     // The same from memory; `name` stands for the file in messages.
-    static Expected<Pack> fromBytes(std::span<const std::byte> bytes, std::string_view name);
+    [[nodiscard]] static Expected<Pack> fromBytes(std::span<const std::byte> bytes, std::string_view name);
     // From records already in memory (generators, tests); validated just as a file is.
-    static Expected<Pack> fromData(PackData data);
+    [[nodiscard]] static Expected<Pack> fromData(PackData data);
 
     std::span<const Element> elements() const;
     std::span<const Contribution> contributions() const;
@@ -109,7 +109,7 @@ class Pack {
     const PackData& data() const { return *data_; }
 
    private:
-    static Expected<Pack> fromSource(PackSource& source, std::string_view name);
+    [[nodiscard]] static Expected<Pack> fromSource(PackSource& source, std::string_view name);
     explicit Pack(std::shared_ptr<const PackData> data) : data_(std::move(data)) {}
     std::shared_ptr<const PackData> data_;
 };

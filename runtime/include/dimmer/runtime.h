@@ -120,7 +120,8 @@ class Runtime : public LightState {
     // records_bytes_max is too little. Unsupported: a device below Vulkan 1.2, or without a format or limit that the
     // pack needs; a loader without a function of Vulkan 1.2, or another one than a runtime has that lives. Whether
     // timelineSemaphore is enabled, and the queues are of these families, it cannot see.
-    static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack, const RuntimeOptions& options = {});
+    [[nodiscard]] static Expected<Runtime> create(const VulkanContext& vulkan, const Pack& pack,
+                                                  const RuntimeOptions& options = {});
     // Waits for what submit() and continueLoading() sent, and for nothing else. Of the caller's submissions those must
     // have completed before that have a record()ed update in them, read pages, probes or gridTable(), or wait for
     // semaphore(). What was recorded and not submitted must not be any more.
@@ -147,7 +148,7 @@ class Runtime : public LightState {
     // record() made that, its submission must have completed on the GPU (idle calls do not count, so that the fence of
     // frames_in_flight frames ago says so); where submit() did, the call blocks until it has, and where submit() has
     // another queue, until all that it sent has.
-    Expected<UpdateStats> record(VkCommandBuffer commands);
+    [[nodiscard]] Expected<UpdateStats> record(VkCommandBuffer commands);
     // The commands of the last record() that found work will never run (a frame was given up): the next update does
     // their work. Calls of record() and submit() that found nothing to do may have come since. Where submit() found
     // work since, or it was taken back already, nothing happens, and it says false. Of several recordings only the last
@@ -163,24 +164,24 @@ class Runtime : public LightState {
     // completed as before a record(), and all where it has another queue. Nothing changed: no submission, no wait, and
     // `wait` is not waited for. Where the pages or probes to write were read on another queue, `wait` must say when
     // that is done: Double, the last frame that read images(pageSet() ^ 1) or probes(probeSet() ^ 1).
-    Expected<UpdateStats> submit(const SubmitWait& wait = {});
+    [[nodiscard]] Expected<UpdateStats> submit(const SubmitWait& wait = {});
     // The timeline semaphore of submit() and the value that its last submission signals; 0 before the first.
     VkSemaphore semaphore() const;
     uint64_t semaphoreValue() const;
     // Blocks until what submit() sent is done. Statistics of the last update that did anything, GPU time included;
     // after record(), call it once the commands have completed.
-    Expected<UpdateStats> wait();
+    [[nodiscard]] Expected<UpdateStats> wait();
 
     // Frees the device memory of a light set's records for other sets. Its weight is 0 from now on and refuses others;
     // the next update takes its light off the pages. What was record()ed before must have been submitted, and have
     // completed where submit() has another queue; or it never runs (discardRecorded()). Unsupported in modes gather and
     // scatter.
-    Expected<void> dropRecords(LightSet set);
+    [[nodiscard]] Expected<void> dropRecords(LightSet set);
     // Begins to bring them (back); continueLoading() does it. OutOfMemory, with nothing changed, when there is no room:
     // it takes a free range of records_bytes_max for each of the set's contributions, so that what is free may be in
     // too many pieces.
     // Loaded, the set is at 0 and takes any weight.
-    Expected<void> loadRecords(LightSet set);
+    [[nodiscard]] Expected<void> loadRecords(LightSet set);
     RecordsState recordsState(LightSet set) const;
     // Of the memory for texels' records: what a light set's take, and what no set's do. 0 in modes gather and scatter.
     uint64_t recordBytes(LightSet set) const;
@@ -188,7 +189,7 @@ class Runtime : public LightState {
     // Copies the next piece, of at most so many bytes (and 4 MiB, as for 0), and returns at once; while the last piece
     // is under way it does nothing. Call it once a frame. Uses the queue of submit(), and 4 MiB of staging memory while
     // it loads.
-    Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
+    [[nodiscard]] Expected<LoadProgress> continueLoading(uint64_t bytes_max = 4 << 20);
 
     // The pages to sample after the last update. Buffering::Double: call it after each, as two sets take turns, even
     // after one of 0 dispatches: where the other set held the state already, it is shown without a recording. The
@@ -215,7 +216,7 @@ class Runtime : public LightState {
         std::vector<uint32_t> irradiance, direction;
         std::vector<uint32_t> probes;  // empty where probes() is null
     };
-    Expected<Pages> readPages();
+    [[nodiscard]] Expected<Pages> readPages();
 
    private:
     struct Impl;
@@ -225,7 +226,7 @@ class Runtime : public LightState {
     bool planNext(UpdateStats& stats);
     void rollback();
     const Planner* plannedProbes() const;
-    Expected<void> checkLoadable(LightSet set) const;
+    [[nodiscard]] Expected<void> checkLoadable(LightSet set) const;
     void finishLoading();
     void finish();
     std::unique_ptr<Impl> impl_;
