@@ -57,7 +57,7 @@ std::vector<glm::vec3> pointsOfSurfaces(const RayScene& rays) {
 
 }  // namespace
 
-LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t> groups) {
+LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t> groups, Progress* progress) {
     const auto isFarOutside = [&](glm::vec3 p) {
         return glm::distance(p, glm::clamp(p, rays.boundsMin(), rays.boundsMax())) > margin_m;
     };
@@ -77,7 +77,11 @@ LightGrid::LightGrid(const RayScene& rays, bool enabled, std::span<const uint8_t
 
     std::vector<std::vector<uint32_t>> reached(sought.size());
     const std::vector<glm::vec3> points = pointsOfSurfaces(rays);
-    tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) { reached[i] = reachedCells(rays, points, sought[i]); });
+    if (progress) progress->stage("rays from lamps", sought.size());
+    tbb::parallel_for(size_t{0}, sought.size(), [&](size_t i) {
+        reached[i] = reachedCells(rays, points, sought[i]);
+        if (progress) progress->advance(1);
+    });
     first_.assign(grid_.count() + 1, 0);
     for (const auto& cells : reached)
         for (const uint32_t cell : cells) ++first_[cell + 1];

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <bake/cell_grid.h>
+#include <bake/progress.h>
 #include <trace/ray_scene.h>
 
 #include <cstdint>
@@ -26,8 +27,9 @@ class LightGrid {
     static constexpr float cell_min_m = 2;
 
     // Disabled, every light reaches everything. `groups`: per light group, whether its lights are asked for; empty:
-    // all.
-    explicit LightGrid(const RayScene& rays, bool enabled = true, std::span<const uint8_t> groups = {});
+    // all. `progress`: a stage of it, where lights are looked for.
+    explicit LightGrid(const RayScene& rays, bool enabled = true, std::span<const uint8_t> groups = {},
+                       Progress* progress = nullptr);
 
     // visit(light) for those whose light may be found at `point`; always in the same order.
     void forEach(glm::vec3 point, auto&& visit) const {

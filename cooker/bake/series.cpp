@@ -51,7 +51,7 @@ class Expansion {
           receivers_(gatherer.receiverCount()),
           settings_(settings),
           progress_(progress),
-          grid_(gatherer.rays(), settings.light_grid, groups),
+          grid_(gatherer.rays(), settings.light_grid, groups, &progress),
           paths_(gatherer.paths()),
           terms_(paths_.termCount()),
           ends_(ends),

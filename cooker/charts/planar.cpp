@@ -302,20 +302,20 @@ bool inOnePlane(const PlanarFace& a, const PlanarFace& b) {
 
 std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint32_t side_max_texels,
                                          const Standing& standing) {
-    std::map<PlaneKey, std::vector<uint32_t>> planes;
-    for (uint32_t i = 0; i < faces.size(); ++i) planes[planeKey(faces[i])].push_back(i);
-    std::vector<ProjectedChart> charts;
-    const auto chart = [&](PlaneGrouper& plane) {
-        std::ranges::move(plane.charts(standing), std::back_inserter(charts));
-    };
-    for (auto& [key, ids] : planes) {
+    std::map<PlaneKey, std::vector<uint32_t>> by_plane;
+    for (uint32_t i = 0; i < faces.size(); ++i) by_plane[planeKey(faces[i])].push_back(i);
+    std::vector<std::vector<uint32_t>> planes;
+    for (auto& [key, ids] : by_plane) planes.push_back(std::move(ids));
+    std::vector<std::vector<ProjectedChart>> of_plane(planes.size());
+    tbb::parallel_for(size_t{0}, planes.size(), [&](size_t p) {
+        const auto chart = [&](PlaneGrouper& plane) {
+            std::ranges::move(plane.charts(standing), std::back_inserter(of_plane[p]));
+        };
+        std::vector<uint32_t>& ids = planes[p];
         const Axes axes(faces[ids[0]].normal);
         PlaneGrouper plane(faces, ids, axes, side_max_texels);
         auto turned = plane.turned();
-        if (turned.empty()) {
-            chart(plane);
-            continue;
-        }
+        if (turned.empty()) return chart(plane);
         std::set<uint32_t> others;
         for (auto& [own_axes, part] : turned) {
             others.insert(part.begin(), part.end());
@@ -323,10 +323,12 @@ std::vector<ProjectedChart> planarCharts(std::span<const PlanarFace> faces, uint
             chart(own);
         }
         std::erase_if(ids, [&](uint32_t id) { return others.contains(id); });
-        if (ids.empty()) continue;
+        if (ids.empty()) return;
         PlaneGrouper rest(faces, std::move(ids), axes, side_max_texels);
         chart(rest);
-    }
+    });
+    std::vector<ProjectedChart> charts;
+    for (auto& found : of_plane) std::ranges::move(found, std::back_inserter(charts));
     // Neighbours in the file tend to be neighbours in space: keep that order, it is kind to caches.
     std::ranges::sort(charts, {}, [](const ProjectedChart& c) { return c.faces[0]; });
     return charts;

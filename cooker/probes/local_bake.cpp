@@ -86,7 +86,7 @@ class LocalBake {
           settings_(settings),
           groups_(groups),
           progress_(progress),
-          lights_(gatherer.rays(), settings.light_grid, groups) {
+          lights_(gatherer.rays(), settings.light_grid, groups, &progress) {
         const auto& models = gatherer.rays().scene().models;
         for (uint32_t m = 0; m < models.size(); ++m) {
             if (models[m].moves) continue;

@@ -411,7 +411,7 @@ uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance,
                           const BakeSettings& settings, Progress& progress) {
     const auto asked_groups = asked();
     if (std::ranges::count(asked_groups, 1) == 0) return 0;
-    const LightGrid lights(gatherer.rays(), settings.light_grid, asked_groups);
+    const LightGrid lights(gatherer.rays(), settings.light_grid, asked_groups, &progress);
     // Blocks that miss the same groups are traced together: most often all of them.
     std::map<std::vector<uint32_t>, std::vector<size_t>> passes;
     for (size_t b = 0; b < blocks_.size(); ++b)
