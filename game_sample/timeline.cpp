@@ -1,7 +1,10 @@
 #include "timeline.h"
 
+#include <update/state_text.h>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace dimmer::sample {
 namespace {
@@ -34,17 +37,16 @@ std::string_view elementOf(const Step& step) {
     return {};
 }
 
-// Of a state as LightState::apply() takes it: "hall=0.5, door:front=1"; "all" is every set.
+// What a state names, "all" being every set; checked when the script was read.
 bool names(std::string_view state, std::string_view element) {
-    while (!state.empty()) {
-        const std::string_view part = state.substr(0, state.find(','));
-        state.remove_prefix(std::min(part.size() + 1, state.size()));
-        std::string_view name = part.substr(0, part.find('='));
-        name.remove_prefix(std::min(name.find_first_not_of(' '), name.size()));
-        name = name.substr(0, name.find_last_not_of(' ') + 1);
-        if (name == element || (name == "all" && !element.starts_with(door_prefix))) return true;
-    }
-    return false;
+    const auto assignments = parseState(state);
+    if (!assignments) return false;
+    const bool is_door = element.starts_with(door_prefix);
+    if (is_door) element.remove_prefix(door_prefix.size());
+    return std::ranges::any_of(*assignments, [&](const StateAssignment& a) {
+        if (a.target == StateAssignment::Target::AllSets) return !is_door;
+        return is_door == (a.target == StateAssignment::Target::Door) && a.name == element;
+    });
 }
 
 // A later step about the same set or door: the earlier one would go on writing over it.
@@ -91,7 +93,12 @@ Expected<std::vector<std::string>> Timeline::advance(uint32_t frame, LightState&
 }
 
 Expected<void> Timeline::begin(const Step& step, LightState& lights) {
-    std::erase_if(running_, [&](const Running& r) { return ends(step, *r.step); });
+    std::optional<Weight> flickered;  // the weight that a flicker which ends here would have given back
+    std::erase_if(running_, [&](const Running& r) {
+        const bool ended = ends(step, *r.step);
+        if (ended && std::holds_alternative<Flicker>(r.step->action)) flickered = r.start_weight;
+        return ended;
+    });
     if (const auto* set = std::get_if<SetState>(&step.action)) return lights.apply(set->state);
     if (const auto* camera = std::get_if<CameraCut>(&step.action)) {
         std::erase_if(running_, [](const Running& r) { return std::holds_alternative<CameraMove>(r.step->action); });
@@ -103,7 +110,7 @@ Expected<void> Timeline::begin(const Step& step, LightState& lights) {
     if (const auto* flicker = std::get_if<Flicker>(&step.action)) {
         const auto set = lights.lightSet(flicker->set);
         if (!set) return std::unexpected(set.error());
-        running.start_weight = lights.weight(*set);
+        running.start_weight = flickered.value_or(lights.weight(*set));
     }
     running_.push_back(running);
     return {};

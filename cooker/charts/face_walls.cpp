@@ -109,16 +109,19 @@ bool FaceWalls::isInWall(glm::vec3 p) const {
     return standing_.inside && standing_.inside(p + lift(wall_probe_low_m), axes_);
 }
 
-// Two places on the way to the face's middle, of which the first is where the open begins. A face goes on to the middle
-// of the wall that it was cut at, and from in there the rest of its own room is beyond the wall; from where the open
-// begins it may be behind the wall's end.
+// Two open places on the way to the face's middle: where the open begins, and as much further as faces are asked for. A
+// face goes on to the middle of the wall that it was cut at, and from in there the rest of its own room is beyond the
+// wall; from where the open begins it may be behind the wall's end.
 std::array<glm::vec3, 2> FaceWalls::outOfWalls(glm::vec3 p, const PlanarFace& face) const {
-    constexpr std::array shares = {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f};
-    const auto at = [&](size_t i) { return glm::mix(p, middleOf(face), shares[std::min(i, shares.size() - 1)]); };
-    size_t open = 0;
-    while (open < shares.size() && isInWall(at(open))) ++open;
-    if (open == shares.size()) return {p, p};
-    return {at(open), at(open + 2)};
+    const glm::vec3 middle = middleOf(face);
+    for (const float share : {0.0f, 0.05f, 0.1f, 0.2f, 0.4f, 0.7f, 1.0f}) {
+        const glm::vec3 first = glm::mix(p, middle, share);
+        if (isInWall(first)) continue;
+        const float left_m = glm::distance(first, middle);
+        const glm::vec3 second = left_m > reach_.near_m ? glm::mix(first, middle, reach_.near_m / left_m) : middle;
+        return {first, isInWall(second) ? first : second};
+    }
+    return {p, p};
 }
 
 glm::vec3 FaceWalls::lift(float height_m) const {

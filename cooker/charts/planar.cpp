@@ -7,6 +7,7 @@
 #include <charts/raster.h>
 
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -254,13 +255,16 @@ class PlaneGrouper {
             reach.largest_m = std::max({reach.largest_m, size_m.x, size_m.y});
         }
         std::vector<std::vector<uint32_t>> beyond_walls(ids_.size());
-        tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), [&](uint32_t a) {
+        const auto look = [&](uint32_t a) {
             const FaceWalls walls(all_[ids_[a]], axes_, reach, standing);
             if (walls.none()) return;
             for (const uint32_t b : boxes_.touching(boxOf(a, reach.near_m + touching_m)))
                 if (a < b && root[a] == root[b] && near(a, b, reach.near_m) && walls.part(all_[ids_[b]]))
                     beyond_walls[a].push_back(b);
-        });
+        };
+        // While it waits a thread takes no other plane on top of this one.
+        tbb::this_task_arena::isolate(
+            [&] { tbb::parallel_for(uint32_t{0}, static_cast<uint32_t>(ids_.size()), look); });
         for (uint32_t a = 0; a < ids_.size(); ++a)
             for (const uint32_t b : beyond_walls[a]) keepApart(apart, a, b);
         return apart.size() > before;

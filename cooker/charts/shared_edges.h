@@ -15,8 +15,8 @@ struct CutMesh {
 
 // Where a triangle ends at a new vertex and its neighbour has none, rasterisers leave single pixels of the two open.
 // Splits every triangle of `meshes` at the new vertices of all of them that lie on its edges, and makes new vertices in
-// one place one, bit for bit. What is interpolated is linear along an edge: the surface stays as it is. Deterministic.
-// Cost: O(log n) of the new vertices for each edge.
+// one place one, bit for bit. Positions and texture coordinates are linear along an edge, and stay as they
+// are; normals are interpolated. Deterministic. Cost for each edge: that of the new vertices in its box, and O(log n).
 void splitSharedEdges(Scene& scene, std::span<const CutMesh> meshes);
 
 }  // namespace dimmer::cook

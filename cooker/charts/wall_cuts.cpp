@@ -203,7 +203,8 @@ class WallCutter {
             return (1 - u - v) * values[index.x] + u * values[index.y] + v * values[index.z];
         };
         mesh.positions_m.push_back(blend(mesh.positions_m));
-        mesh.normals.push_back(glm::normalize(blend(mesh.normals)));
+        const glm::vec3 normal = blend(mesh.normals);
+        mesh.normals.push_back(glm::length(normal) > 1e-3f ? glm::normalize(normal) : mesh.normals[index.x]);
         if (!mesh.uv0.empty()) mesh.uv0.push_back(blend(mesh.uv0));
         return static_cast<uint32_t>(mesh.positions_m.size() - 1);
     }

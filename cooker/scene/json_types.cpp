@@ -201,7 +201,7 @@ class TypeChecker {
         if (!names || !names->is_array()) return;
         for (const json& name : *names) {
             if (!name.is_string() || isKnownExtension(name.get<std::string>()) || !problem_.empty()) continue;
-            const auto extension = name.get<std::string>();
+            const auto extension = name.get<std::string>().substr(0, 60);
             const bool compressed = extension.ends_with("_compression");
             problem_ = fmt::format(
                 "{}: extensionsRequired: needs the extension '{}', which is not supported. Export the level without "

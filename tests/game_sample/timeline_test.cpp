@@ -82,7 +82,8 @@ TEST_F(TimelineTest, FlickerStaysWithinItsRangeOfTheWeightAndGivesItBack) {
 // A lamp that is shot out while it flickers or fades stays dark, and of two fades the earlier does not come back.
 TEST_F(TimelineTest, ALaterCommandEndsWhatRunsThere) {
     for (const char* running : {"flicker hall 0.5 1 for 20 seed 3", "fade hall 1 0.5 over 20"})
-        for (const char* shot : {"set hall=0", "set door:front=1, hall=0", "set all=0", "fade hall 0 0 over 2"}) {
+        for (const char* shot : {"set hall=0", "set door:front=1, hall =0", "set \"door: front=1,hall\t=0\"",
+                                 "set all=0", "fade hall 0 0 over 2"}) {
             SCOPED_TRACE(shot);
             play(fmt::format("at 1 {}\nat 5 {}", running, shot), 30,
                  [&](uint32_t frame, const Timeline&, const auto& changes) {
@@ -98,6 +99,16 @@ TEST_F(TimelineTest, ALaterCommandEndsWhatRunsThere) {
     play("at 0 fade door:front 0 1 over 10\nat 5 set all=0", 10, [&](uint32_t frame, const Timeline&, const auto&) {
         EXPECT_EQ(lights_.open(*lights_.door("front")), static_cast<float>(frame) / 10);  // no set
     });
+}
+
+// What it gives back is what the first one found, not what that had made of it.
+TEST_F(TimelineTest, AFlickerThatFollowsAnotherGivesBackTheSameWeight) {
+    play("at 1 flicker hall 0.2 0.4 for 20 seed 1\nat 5 flicker hall 0.5 0.6 for 10 seed 2", 20,
+         [&](uint32_t frame, const Timeline&, const auto&) {
+             if (frame >= 5) {
+                 EXPECT_GE(hall().r, frame < 15 ? 0.5f : 1.0f) << frame;
+             }
+         });
 }
 
 TEST_F(TimelineTest, FlickerNoiseIsUniformAndDependsOnItsSeed) {

@@ -459,6 +459,24 @@ TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
     }
 }
 
+// A room of 4 m, and one of 400 numbers that are centimetres.
+TEST(TooLargeForTexels, IsSaidOfLevelsInAnotherUnit) {
+    for (const float half_m : {2.0f, 200.0f}) {
+        Scene scene;
+        scene.file = "level.glb";
+        addBox(scene, half_m * glm::vec3(1, 0.7f, 1), addMaterial(scene, lambert(0.5f)));
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 1.5f, .page_size = 2048});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 1);
+        const auto warning = tooLargeForTexels(rays, *charts, texels);
+        ASSERT_EQ(warning.has_value(), half_m > 2) << texels.size();
+        if (!warning) continue;
+        EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: is 400 x 280 x 400 m"), HasSubstr("12 faces"),
+                                             HasSubstr("in metres,")));
+    }
+}
+
 // Ground of 10 m in triangles of 25 cm, with sharp edges between all: its charts are narrow, and it is not.
 TEST(TooSmallForTexels, IsNotSaidOfFineTriangles) {
     Scene scene;

@@ -283,7 +283,7 @@ TEST(SceneGeometry, DegenerateTrianglesAreDropped) {
 
 // What floats round to a point took a page of texels, and its normals were none.
 TEST(SceneGeometry, TrianglesOfLessThanAMicrometreAreDropped) {
-    for (const float side_m : {1e-3f, 1e-5f, 1e-7f, 1e-13f, 1e-20f, 1e-30f}) {
+    for (const float side_m : {1e-3f, 0.8e-6f, 0.6e-6f, 1e-13f, 1e-20f, 1e-30f}) {
         SCOPED_TRACE(side_m);
         LevelFile level = LevelFile::withFloor();
         level.addNode({{"name", "speck"},
@@ -291,7 +291,7 @@ TEST(SceneGeometry, TrianglesOfLessThanAMicrometreAreDropped) {
                                               std::vector(3, glm::vec3(0, 0, 1)), {0, 1, 2}, 0)}});
         const auto scene = level.import();
         ASSERT_IMPORTED(scene);
-        EXPECT_EQ(scene->meshes.size(), side_m >= 1e-5f ? 2u : 1u);
+        EXPECT_EQ(scene->meshes.size(), side_m * std::sqrt(2.0f) > 1e-6f ? 2u : 1u);
         if (scene->meshes.size() == 1) expectWarning(*scene, {"node 'speck'", "1 triangles without area"});
     }
 }
