@@ -29,9 +29,7 @@ struct BakedScene {
     BakedScene(const BakedScene&) = delete;
     BakedScene& operator=(const BakedScene&) = delete;
 
-    void bake(const BakeSettings& settings) {
-        baked = cook::bake(*rays, charts, texels, settings, no_progress);
-    }
+    void bake(const BakeSettings& settings) { baked = cook::bake(*rays, charts, texels, settings, no_progress); }
     // Of one term at a receiver; nothing stored is darkness.
     glm::vec3 lux(size_t receiver, uint32_t term = always_group) const {
         for (const ReceiverLight& l : baked.light.row(receiver))
