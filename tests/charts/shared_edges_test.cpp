@@ -32,8 +32,8 @@ Places placesOf(const Scene& scene) {
 }
 
 // Of `places`, those that lie between the ends of an edge along which no triangle of the mesh goes back.
-size_t placesWithinEdges(const Scene& scene, const Places& places) {
-    constexpr double near_m = 1e-4;  // what a gap that shows is wider than; rounding at 6 m is 5e-7
+// `near_m`: what a gap that shows is wider than; rounding at 6 m is 5e-7.
+size_t placesWithinEdges(const Scene& scene, const Places& places, double near_m = 1e-4) {
     size_t within = 0;
     for (const SceneMesh& mesh : scene.meshes) {
         std::set<std::array<float, 6>> edges;
@@ -110,14 +110,17 @@ TEST(SharedEdges, CutsLeaveNoVertexWithinAnEdge) {
 // Far out floats are coarser than what cuts differ by near the origin.
 TEST(SharedEdges, CutsFarFromTheOriginAreClosedToo) {
     Scene scene = rooms();
-    for (SceneMesh& mesh : scene.meshes)
-        for (glm::vec3& p : mesh.positions_m) p += glm::vec3(1900, 0, -1700);
+    const glm::mat3 turned(glm::rotate(glm::mat4(1), glm::radians(30.0f), {0, 1, 0}));
+    for (SceneMesh& mesh : scene.meshes) {
+        for (glm::vec3& p : mesh.positions_m) p = turned * p + glm::vec3(3900, 0, -3700);
+        for (glm::vec3& n : mesh.normals) n = turned * n;
+    }
     const Places old = placesOf(scene);
     cutAtWalls(scene, 4);
     Places fresh;
     std::ranges::set_difference(placesOf(scene), old, std::back_inserter(fresh), lessThan);
     EXPECT_GT(fresh.size(), 12u);
-    EXPECT_EQ(placesWithinEdges(scene, fresh), 0u);
+    EXPECT_EQ(placesWithinEdges(scene, fresh, 4 * 2.44e-4), 0u);  // four steps of floats from 2048 m on
 }
 
 // Where a cut meets normals that look opposite ways, and triangles too small to have an area in floats.
