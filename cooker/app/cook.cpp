@@ -186,7 +186,7 @@ int run(const CookArguments& a) {
     options.cache = cacheOf(a);
     CookResult failed;
     auto result = cook(options, *progress, &failed);
-    sayWarnings(result ? result->stats.warnings : failed.stats.warnings);
+    for (const std::string& warning : result ? result->stats.warnings : failed.stats.warnings) progress->warn(warning);
     const auto files = filesThere(inputs);
     if (!result) return reportFailure(a, files, result.error(), failed);
     if (auto ok = writeOthers(a, files, *result); !ok)

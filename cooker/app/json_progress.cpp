@@ -29,6 +29,11 @@ void JsonProgress::advance(uint64_t steps) {
     if (Clock::now() - printed_ >= print_every) print(done_);
 }
 
+void JsonProgress::warn(std::string_view warning) {
+    const std::scoped_lock lock(mutex_);
+    warnings_.say(warning);
+}
+
 void JsonProgress::finish() {
     const std::scoped_lock lock(mutex_);
     if (!name_.empty()) print(total_);

@@ -1,6 +1,7 @@
 // Progress for pipelines: lines of JSON on stderr.
 #pragma once
 
+#include <app/say.h>
 #include <bake/progress.h>
 
 #include <chrono>
@@ -15,6 +16,7 @@ class JsonProgress final : public Progress {
    public:
     void stage(std::string_view name, uint64_t total) override;
     void advance(uint64_t steps) override;
+    void warn(std::string_view warning) override;
     void finish() override;
 
    private:
@@ -22,6 +24,7 @@ class JsonProgress final : public Progress {
     void print(uint64_t done);
 
     std::mutex mutex_;
+    WarningsOnce warnings_;
     std::string name_;
     uint64_t done_ = 0, total_ = 0;
     Clock::time_point started_, printed_;

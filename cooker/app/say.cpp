@@ -1,6 +1,7 @@
 #include <app/say.h>
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -28,6 +29,10 @@ void sayMessage(std::string_view message) noexcept {
 
 void sayWarnings(std::span<const std::string> warnings) {
     for (const std::string& warning : warnings) sayMessage("warning: " + warning);
+}
+
+void WarningsOnce::say(std::string_view warning) {
+    if (said_.emplace(warning).second) sayMessage(fmt::format("warning: {}", warning));
 }
 
 void keepClosedStreamsClosed() noexcept {

@@ -1,6 +1,8 @@
 // What goes to stderr. Where that is closed or full it is lost and the work goes on: nothing here throws.
 #pragma once
 
+#include <functional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,6 +16,15 @@ void say(std::string_view text) noexcept;
 void sayMessage(std::string_view message) noexcept;
 
 void sayWarnings(std::span<const std::string> warnings);
+
+// Says a warning the first time that it comes.
+class WarningsOnce {
+   public:
+    void say(std::string_view warning);
+
+   private:
+    std::set<std::string, std::less<>> said_;
+};
 
 // Takes the places of standard streams that the caller closed, so that no file which is opened later gets one of their
 // numbers and what is printed. Using them stays an error. To be called before any file is opened.

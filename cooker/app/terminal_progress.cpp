@@ -34,6 +34,13 @@ void TerminalProgress::advance(uint64_t steps) {
     draw();
 }
 
+void TerminalProgress::warn(std::string_view warning) {
+    const std::scoped_lock lock(mutex_);
+    if (terminal_) say("\r\x1b[K");
+    warnings_.say(warning);
+    if (terminal_ && !name_.empty()) draw();
+}
+
 void TerminalProgress::finish() {
     const std::scoped_lock lock(mutex_);
     endStage();

@@ -1,6 +1,7 @@
 // Progress for people: a bar with the time left on a terminal, a line per stage otherwise.
 #pragma once
 
+#include <app/say.h>
 #include <bake/progress.h>
 
 #include <chrono>
@@ -14,6 +15,7 @@ class TerminalProgress final : public Progress {
     TerminalProgress();
     void stage(std::string_view name, uint64_t total) override;
     void advance(uint64_t steps) override;
+    void warn(std::string_view warning) override;
     void finish() override;
 
    private:
@@ -23,6 +25,7 @@ class TerminalProgress final : public Progress {
 
     bool terminal_;
     std::mutex mutex_;
+    WarningsOnce warnings_;
     std::string name_;
     uint64_t done_ = 0, total_ = 0;
     Clock::time_point started_, drawn_;

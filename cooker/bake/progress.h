@@ -12,14 +12,17 @@ class Progress {
     // Starts a stage of `total` steps and ends the one before it.
     virtual void stage(std::string_view name, uint64_t total) = 0;
     virtual void advance(uint64_t steps) = 0;
+    // Of the input, before the long work: who reads it may stop and mend it. To be said once, however often it comes.
+    virtual void warn(std::string_view warning) = 0;
     // Ends the last stage.
     virtual void finish() = 0;
 };
 
-class SilentProgress final : public Progress {
+class SilentProgress : public Progress {
    public:
     void stage(std::string_view, uint64_t) override {}
     void advance(uint64_t) override {}
+    void warn(std::string_view) override {}
     void finish() override {}
 };
 

@@ -131,6 +131,7 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     // The scene's, too: a pack in the cache is that of the same warnings.
     for (auto* warnings : {&result.stats.warnings, &scene->warnings})
         warnings->insert(warnings->end(), idle->begin(), idle->end());
+    for (const std::string& warning : result.stats.warnings) progress.warn(warning);
     result.profile = *profile;
     result.grid_wanted = wantsGrid(*profile, *scene);
     auto cache = openCache(options, result.stats);

@@ -124,7 +124,9 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
         progress.stage("charts", 1);
         if (auto ok = findReceivers(profile, *quality, cache, at); !ok) return std::unexpected(ok.error());
         progress.advance(1);
+        const size_t known = stats.warnings.size();
         warnOfPlaces(at, stats);
+        for (const std::string& warning : std::span(stats.warnings).subspan(known)) progress.warn(warning);
     }
     if (std::ranges::any_of(level.scene.models, [](const SceneModel& model) { return !model.meshes.empty(); })) {
         const Stopwatch watch(stats.seconds["models"]);

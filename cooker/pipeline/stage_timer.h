@@ -30,6 +30,7 @@ class StageTimer final : public Progress {
         progress_.stage(name, total);
     }
     void advance(uint64_t steps) override { progress_.advance(steps); }
+    void warn(std::string_view warning) override { progress_.warn(warning); }
     void finish() override { progress_.finish(); }
 
    private:

@@ -130,6 +130,30 @@ TEST_F(Commands, AFileThatAShippedProfileHidesIsPointedAt) {
     for (const auto* result : {&local, &other}) EXPECT_THAT(result->err, Not(HasSubstr("shipped")));
 }
 
+// Who reads that a level is amiss may stop the cook there, hours before its end.
+TEST_F(Commands, WarnsOfTheLevelBeforeTheBakeAndOnce) {
+    json level = json::parse(readText(file("level.gltf")));
+    level["nodes"][0]["extras"]["dimmer_texel_densty"] = 2;
+    for (json& node : level["nodes"]) {
+        json place = node.value("translation", json{0, 0, 0});
+        place[0] = place[0].get<float>() + 4000;
+        node["translation"] = place;
+    }
+    write("amiss.gltf", level.dump());
+    const auto result = cook("amiss.dimmer", {"--progress", "json"}, "amiss.gltf");
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    size_t last = 0;
+    for (const char* text :
+         {"dimmer_texel_densty", R"("stage":"charts")", "m from the origin", R"("stage":"final gather")"}) {
+        const size_t at = result.err.find(text);
+        ASSERT_NE(at, std::string::npos) << text << '\n' << result.err;
+        EXPECT_GT(at, last) << text;
+        last = at;
+    }
+    for (const char* text : {"dimmer_texel_densty", "m from the origin"})
+        EXPECT_EQ(result.err.find(text), result.err.rfind(text)) << result.err;
+}
+
 TEST_F(Commands, OverBudgetIsExitCodeThree) {
     write("tight.json", R"({"extends": "quick.json", "budgets": {"total": 1000}})");
     write("kept.dimmer", "the old pack");

@@ -152,11 +152,9 @@ TEST(Dissect, LampsTakenApartAreToldOfAsTheirSet) {
     EXPECT_NEAR(parts->surface.mean, whole->surface.mean, 0.003);
 }
 
-struct CountedStages final : Progress {
+struct CountedStages final : SilentProgress {
     int count = 0;
     void stage(std::string_view, uint64_t) override { ++count; }
-    void advance(uint64_t) override {}
-    void finish() override {}
 };
 
 // Before anything is measured.
