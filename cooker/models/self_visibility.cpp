@@ -16,6 +16,8 @@ namespace {
 // By the cosine; what is counted is how much of the lobe is hidden, so that what hides nothing has no noise.
 constexpr uint32_t rays_per_point = 512;
 constexpr int bounces = 2;
+// Before the last round: its rays average over what these find, whose noise is then lost in theirs.
+constexpr uint32_t rays_of_bounces = 64;
 // Rays start this share of the model's size off the surface, and no less than a tenth of a millimetre.
 constexpr float lift_share = 1e-3f, lift_min_m = 1e-4f;
 
@@ -46,12 +48,13 @@ class TransferTracer {
     ModelTransfers run(Progress& progress) {
         for (const SceneMesh& mesh : own_.meshes) now_.emplace_back(mesh.positions_m.size());
         for (int bounce = 0; bounce <= bounces; ++bounce) {
+            const uint32_t rays = bounce < bounces ? rays_of_bounces : rays_per_point;
             ModelTransfers next = now_;
             tbb::parallel_for(size_t{0}, vertices_.size(), [&](size_t i) {
                 const auto [m, v] = vertices_[i];
                 auto& sides = next[m][v];
-                sides[0] = at(m, v, false, static_cast<uint32_t>(i));
-                sides[1] = isDoubleSided(m) ? at(m, v, true, static_cast<uint32_t>(i)) : sides[0];
+                sides[0] = at(m, v, false, static_cast<uint32_t>(i), rays);
+                sides[1] = isDoubleSided(m) ? at(m, v, true, static_cast<uint32_t>(i), rays) : sides[0];
                 progress.advance(1);
             });
             now_ = std::move(next);
@@ -69,14 +72,14 @@ class TransferTracer {
     // meet in the vertex, as often as they are drawn with the vertex's share (which has a density of 6 w (1 - w), that
     // of the middle one of three numbers): so the mean over the surface is right, and a corner that touches something
     // does not darken all around it (Kavan, Bargteil and Sloan 2011, Least Squares Vertex Baking, without the solve).
-    LightTransfer at(uint32_t mesh, uint32_t vertex, bool back, uint32_t seed) const {
+    LightTransfer at(uint32_t mesh, uint32_t vertex, bool back, uint32_t seed, uint32_t rays) const {
         const SceneMesh& m = own_.meshes[mesh];
         const auto& around = incident_[mesh][vertex];
         const glm::vec3 normal = m.normals[vertex] * (back ? -1.0f : 1.0f);
         glm::vec3 tangent, bitangent;
         orthonormalBasis(normal, tangent, bitangent);
         std::array<float, sh_count> change{};
-        for (uint32_t i = 0; !around.empty() && i < rays_per_point; ++i) {
+        for (uint32_t i = 0; !around.empty() && i < rays; ++i) {
             const glm::vec3 d = cosineDirection(sequence2d(i, seed));
             const glm::vec3 direction = tangent * d.x + bitangent * d.y + normal * d.z;
             const Start start = startAt(around, m.positions_m[vertex], i, seed);
@@ -91,7 +94,7 @@ class TransferTracer {
         }
         const glm::vec3 n = model_from_world_ * normal;
         LightTransfer transfer = normalTransfer({n.x, n.y, n.z});
-        for (size_t k = 0; k < sh_count; ++k) transfer.coefficients[k] += change[k] * pi / rays_per_point;
+        for (size_t k = 0; k < sh_count; ++k) transfer.coefficients[k] += change[k] * pi / static_cast<float>(rays);
         return transfer;
     }
 
