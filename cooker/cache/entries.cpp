@@ -76,8 +76,12 @@ struct StoredLight {
 StoredLight stored(const ReceiverLight& l) {
     return {l.light, l.keep};
 }
-const ProbeLight& stored(const ProbeTermLight& l) {
-    return l.light;
+struct StoredProbeLight {
+    ProbeLight light;
+    float variance;
+};
+StoredProbeLight stored(const ProbeTermLight& l) {
+    return {l.light, l.variance};
 }
 glm::vec3 stored(const TermLight& l) {
     return l.value();
@@ -86,8 +90,9 @@ void restore(const StoredLight& from, ReceiverLight& l) {
     l.light = from.light;
     l.keep = from.keep;
 }
-void restore(const ProbeLight& from, ProbeTermLight& l) {
-    l.light = from;
+void restore(const StoredProbeLight& from, ProbeTermLight& l) {
+    l.light = from.light;
+    l.variance = from.variance;
 }
 void restore(const glm::vec3& from, TermLight& l) {
     static const Rounding any(0, Rounding::Of::Outgoing);  // nothing is left to round

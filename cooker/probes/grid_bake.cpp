@@ -45,15 +45,15 @@ struct PlaceTerm {
     uint32_t place;
     Light* light;
 };
-using SiteTerm = PlaceTerm<const ProbeLight>;
-using ProbeTerm = PlaceTerm<ProbeLight>;
+using SiteTerm = PlaceTerm<const ProbeTermLight>;
+using ProbeTerm = PlaceTerm<ProbeTermLight>;
 
 // Per term, ascending places. Points into the rows.
 template <class Light>
 std::vector<std::vector<PlaceTerm<Light>>> byTerm(size_t rows, size_t terms, auto&& rowOf) {
     std::vector<std::vector<PlaceTerm<Light>>> places(terms);
     for (uint32_t i = 0; i < rows; ++i)
-        for (auto& l : rowOf(i)) places[l.term].push_back({i, &l.light});
+        for (auto& l : rowOf(i)) places[l.term].push_back({i, &l});
     return places;
 }
 
@@ -81,17 +81,19 @@ class TermFit {
         std::vector<FitValue> probes;
         for (const ProbeTerm& member : members) {
             number_[member.place] = static_cast<uint32_t>(probes.size());
-            probes.push_back(valueOf(*member.light));
+            probes.push_back(valueOf(member.light->light));
         }
         chooseSites(members);
         const float floor = floorOfLight();
-        for (size_t s = 0; s < sites_.size(); ++s) sites_[s].importance = importanceOf(targets_[s], floor);
+        for (size_t s = 0; s < sites_.size(); ++s) sites_[s].importance = weigh(targets_[s], variances_[s], floor);
         std::vector<float> own;
-        for (size_t i = 0; i < members.size(); ++i)
-            own.push_back(placed_.guessed[members[i].place] ? 0 : importanceOf(probes[i], floor));
+        for (size_t i = 0; i < members.size(); ++i) {
+            const float importance = weigh(probes[i], members[i].light->variance, floor);
+            own.push_back(placed_.guessed[members[i].place] ? 0 : importance);
+        }
         fitProbes(sites_, targets_, probes, fit_tolerance, own);
         for (size_t i = 0; i < members.size(); ++i)
-            members[i].light->radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
+            members[i].light->light.radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
     }
 
    private:
@@ -111,7 +113,7 @@ class TermFit {
     }
 
     // Light of one term lies a row's length apart.
-    static void prefetch(const ProbeLight* light) {
+    static void prefetch(const ProbeTermLight* light) {
         for (size_t byte = 0; byte < sizeof *light; byte += 64)
             __builtin_prefetch(reinterpret_cast<const char*>(light) + byte);
     }
@@ -131,11 +133,15 @@ class TermFit {
                 known += site.shares[k];
             }
             if (!(known > 0)) continue;
-            targets_.push_back(lit != light_.end() && lit->place == s ? valueOf(*lit->light) : FitValue{});
+            const bool is_lit = lit != light_.end() && lit->place == s;
+            targets_.push_back(is_lit ? valueOf(lit->light->light) : FitValue{});
+            variances_.push_back(is_lit ? lit->light->variance : 0);
             sites_.push_back(site);
         }
     }
 
+    // Of the first coefficient; the mean irradiance is lux_of_brightness times as much.
+    static constexpr float lux_of_brightness = 0.886227f;  // sqrt(pi) / 2
     static float brightness(const FitValue& light) { return std::max(0.0f, luminance({light[0], light[1], light[2]})); }
 
     // Darker places count no more.
@@ -149,9 +155,24 @@ class TermFit {
 
     // Between absolute errors and shares, as placement has it, and closer to shares, as lamps' light is known to be
     // fitted to many places here: with 1 instead of 1.5 the 95th percentile near lamps is a tenth larger.
-    static float importanceOf(const FitValue& light, float floor) {
-        const float share = floor / (brightness(light) + floor);
+    static float importanceOf(float brightness, float floor) {
+        const float share = floor / (brightness + floor);
         return share * std::sqrt(share);  // to the power of 1.5
+    }
+
+    // The importance of a place's light. By its own brightness, what noise makes too dark would count more than what it
+    // makes too bright, and where few rays find the light most places are too dark: each half of a place's rays counts
+    // by what the other half found, and the light becomes their mean (of halves that are alike in all but how much
+    // they found).
+    static float weigh(FitValue& light, float variance_lux2, float floor) {
+        const float whole = brightness(light);
+        if (!(whole > 0)) return importanceOf(0, floor);
+        const float off = std::min(std::sqrt(variance_lux2) / lux_of_brightness, whole);
+        const float first = whole + off, second = whole - off;
+        const float of_first = importanceOf(second, floor), of_second = importanceOf(first, floor);
+        const float both = of_first + of_second, scale = (of_first * first + of_second * second) / (both * whole);
+        for (float& v : light) v *= scale;
+        return both / 2;
     }
 
     const Placement& placed_;
@@ -160,6 +181,7 @@ class TermFit {
     std::vector<uint32_t> number_;  // per position, among the probes of the term
     std::vector<FitSite> sites_;
     std::vector<FitValue> targets_;
+    std::vector<float> variances_;  // of the targets' irradiance, lux^2
 };
 
 }  // namespace
@@ -176,9 +198,9 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
     auto rows = tracedAtProbes(*placed, light);
     if (settings.fit) {
         const auto sites =
-            byTerm<const ProbeLight>(light.rows(), terms.size(), [&](uint32_t s) { return light.row(s); });
+            byTerm<const ProbeTermLight>(light.rows(), terms.size(), [&](uint32_t s) { return light.row(s); });
         const auto members =
-            byTerm<ProbeLight>(rows.size(), terms.size(), [&](uint32_t i) { return std::span(rows[i]); });
+            byTerm<ProbeTermLight>(rows.size(), terms.size(), [&](uint32_t i) { return std::span(rows[i]); });
         const auto sites_of_probes = sitesOfProbes(*placed);
         tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) {
             TermFit(*placed, sites_of_probes, sites[t]).fit(members[t]);

@@ -53,8 +53,10 @@ class Chooser {
 
     Expected<SiteChoice> run() {
         const uint32_t wanted = decideCounts();
-        const uint32_t rays = std::clamp(small_level_places * settings_.site_rays / std::max(wanted, 1u),
-                                         settings_.site_rays, small_level_factor * settings_.site_rays);
+        const uint32_t affordable =
+            std::clamp(small_level_places * settings_.site_rays / std::max(wanted, 1u), settings_.site_rays,
+                       small_level_factor * settings_.site_rays);
+        const uint32_t rays = (affordable + 1) / 2 * 2;  // in two halves
         const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
         out_.blocks.push_back({allOver(wanted - at_lamps), rays});
         const auto lamps = static_cast<uint32_t>(lamps_.size());
@@ -190,42 +192,57 @@ class PlaceTrace {
           settings_(settings),
           sum_(gatherer.paths().termCount()),
           direct_(gatherer.paths().termCount()),
+          full_(gatherer.paths().termCount()),
+          first_half_lux_(gatherer.paths().termCount()),
           wanted_in_group_(gatherer.paths().groupCount()) {
         for (uint32_t t = 0; t < gatherer.paths().termCount(); ++t) {
             const uint32_t group = gatherer.paths().terms()[t].group;
             sum_.setWanted(t, groups[group] != 0);
+            full_.setWanted(t, groups[group] != 0);
             wanted_in_group_[group] += groups[group];
         }
     }
 
-    // Adds what is active there, ascending. `ends`: of the rays, as GatherOptions::row. Returns the rays traced.
+    // Adds what is active there, ascending, with the noise that two halves of an even number of rays tell. `ends`: of
+    // the rays, as GatherOptions::row. Returns the rays traced.
     uint64_t trace(glm::vec3 place, uint32_t rays, RowEnds* ends, std::vector<ProbeTermLight>& row) {
         const SamplePoint point{place, no_face};
         // A place has noise of its own wherever it stands in whatever list.
         uint32_t seed = site_seed;
         for (int c = 0; c < 3; ++c) seed = hash(seed, std::bit_cast<uint32_t>(place[c]));
         const GatherFrom from = Gatherer::atProbe(point, seed);
-        const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, sum_);
+        const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, full_);
         const bool known = ends && ends->ends[0] != RayEnd::unknown;
-        gatherer_.gather(from,
-                         {.rays = rays,
-                          .emitter_samples = settings_.emitter_samples * rays / rays_per_round,
-                          .seed = settings_.seed + 2,
-                          .wanted_in_group = wanted_in_group_,
-                          .row = ends},
-                         &radiance_, sum_, nullptr);
+        for (const uint32_t first_ray : {0u, rays / 2}) {
+            gatherer_.gather(from,
+                             {.rays = rays / 2,
+                              .emitter_samples = settings_.emitter_samples * rays / 2 / rays_per_round,
+                              .seed = settings_.seed + 2,
+                              .first_ray = first_ray,
+                              .wanted_in_group = wanted_in_group_,
+                              .row = ends},
+                             &radiance_, sum_, nullptr);
+            if (first_ray > 0) continue;
+            for (const uint32_t t : sum_.touched()) first_half_lux_[t] = luminance(sum_[t].irradiance());
+        }
         if (sum_.wants(always_group)) sum_[always_group];  // every site has some
-        for (const uint32_t t : direct_.touched())
-            if (sum_.wants(t)) sum_[t];
+        for (auto* direct : {&direct_, &full_})
+            for (const uint32_t t : direct->touched())
+                if (sum_.wants(t)) sum_[t];
         row.reserve(sum_.touched().size());
         for (const uint32_t t : sum_.touched()) {
             if (!sum_.wants(t)) continue;
-            const ProbeLight& light = sum_[t];
-            if (isActive(reports_[t], t, luminance(direct_[t].irradiance()), luminance(light.irradiance())))
-                row.push_back({t, light, 0, 0});
+            ProbeLight light = sum_[t] * 0.5f;  // of two halves
+            const float off = first_half_lux_[t] - luminance(light.irradiance());
+            first_half_lux_[t] = 0;
+            light += full_[t];
+            const float lux = luminance(light.irradiance());
+            if (isActive(reports_[t], t, luminance(direct_[t].irradiance()), lux))
+                row.push_back({t, light, off * off, 0});
         }
         sum_.clear();
         direct_.clear();
+        full_.clear();
         return shadow_rays + (known ? 0 : rays);
     }
 
@@ -235,7 +252,8 @@ class PlaceTrace {
     const SparseLight& radiance_;
     std::span<const TermReport> reports_;
     const BakeSettings& settings_;
-    TermAccumulator<ProbeLight> sum_, direct_;
+    TermAccumulator<ProbeLight> sum_, direct_, full_;  // the last: direct light of lamps that are baked in full
+    std::vector<float> first_half_lux_;  // per term, of what rays found; 0 between places
     std::vector<uint32_t> wanted_in_group_;
 };
 
@@ -401,7 +419,7 @@ Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t gr
             row.clear();
             for (const ProbeTermLight& l :
                  std::ranges::equal_range(rows[i], group, {}, [&](const auto& of) { return groupOf(of); }))
-                row.push_back({paths_.numberInGroup(l.term), l.light, 0, 0});
+                row.push_back({paths_.numberInGroup(l.term), l.light, l.variance, 0});
             emit(std::span<const ProbeTermLight>(row));
         }
     });
@@ -479,7 +497,7 @@ Sparse<ProbeTermLight> SiteLight::take() {
             row.clear();
             for (uint32_t g = 0; g < paths_.groupCount(); ++g)
                 for (const ProbeTermLight& l : light_[g][order[i].block].row(order[i].row))
-                    row.push_back({paths_.termsOf(g)[l.term], l.light, 0, 0});
+                    row.push_back({paths_.termsOf(g)[l.term], l.light, l.variance, 0});
             std::ranges::sort(row, {}, &ProbeTermLight::term);
             emit(std::span<const ProbeTermLight>(row));
         }

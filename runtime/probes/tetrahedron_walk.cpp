@@ -121,16 +121,26 @@ std::array<float, 4> probeWeights(const GlobalGrid& grid, const GridPlace& place
     if (grid.visibility.empty()) return place.barycentric;
     const auto& seen = grid.visibility[place.tetrahedron].seen;
     const std::array<float, 4>& b = place.barycentric;
-    std::array<float, 4> weights;
+    std::array<float, 4> weights, visible;
     float sum = 0;
     for (size_t v = 0; v < 4; ++v) {
         const float field = b[0] * static_cast<float>(seen[v][0]) + b[1] * static_cast<float>(seen[v][1]) +
                             b[2] * static_cast<float>(seen[v][2]) + b[3] * static_cast<float>(seen[v][3]);
-        const float visible = field * (visibility_slope / 127.0f);
-        weights[v] = b[v] * (visible > 0 ? (visible < 1 ? visible : 1.0f) : 0.0f);
+        visible[v] = field * (visibility_slope / 127.0f);
+        weights[v] = b[v] * (visible[v] > 0 ? (visible[v] < 1 ? visible[v] : 1.0f) : 0.0f);
         sum += weights[v];
     }
-    if (!(sum > visible_weight_min)) return b;
+    if (!(sum > visible_weight_min)) {
+        float most = -2 * visibility_slope;
+        for (size_t v = 0; v < 4; ++v)
+            if (b[v] > visible_weight_min && visible[v] > most) most = visible[v];
+        sum = 0;
+        for (size_t v = 0; v < 4; ++v) {
+            const float above = visible[v] - (most - least_hidden_span);
+            weights[v] = b[v] * (above > 0 ? above : 0.0f);
+            sum += weights[v];
+        }
+    }
     const float inverse = reciprocal(sum);
     for (float& w : weights) w *= inverse;
     return weights;

@@ -23,6 +23,9 @@ inline constexpr uint32_t settle_steps_max = 4;
 inline constexpr float visibility_slope = 8;
 // With less than this in sight a point counts as seen by none.
 inline constexpr float visible_weight_min = 1e-5f;
+// There, probes count that are hidden by less than this more than the least hidden one is, in visibility: on a floor
+// those above it are hidden by rounding, those below by the floor.
+inline constexpr float least_hidden_span = 0.25f;
 
 struct GridPlace {
     uint32_t tetrahedron = 0;
@@ -35,8 +38,8 @@ struct GridPlace {
 GridPlace locate(const GlobalGrid& grid, std::array<float, 3> point_m, uint32_t hint = no_tetrahedron,
                  uint32_t steps_max = walk_steps_max);
 
-// The shares of the four probes in the light at a place: barycentric among those that see it, or among all when none
-// does. Each 0..1, sum 1.
+// The shares of the four probes in the light at a place: barycentric among those that see it, or where none does
+// among the least hidden. Each 0..1, sum 1.
 std::array<float, 4> probeWeights(const GlobalGrid& grid, const GridPlace& place);
 
 }  // namespace dimmer

@@ -31,6 +31,7 @@ const uint dimmer_settle_steps_max = 4u;
 const float dimmer_inside_tolerance = 1e-4;
 const float dimmer_visibility_slope = 8.0;
 const float dimmer_visible_weight_min = 1e-5;
+const float dimmer_least_hidden_span = 0.25;
 
 struct DimmerGridPlace {
     uint tetrahedron;
@@ -144,19 +145,29 @@ vec4 dimmer_probe_weights(DimmerGridPlace place) {
     vec4 b = place.barycentric;
     if (DIMMER_GRID_WORDS(3).x == 0u) return b;
     uvec4 seen = dimmer_tetrahedron_part(place.tetrahedron, 2u);
-    precise vec4 weights;
+    precise vec4 weights, visible;
     for (int v = 0; v < 4; ++v) {
         precise float field = b.x * float(bitfieldExtract(int(seen[v]), 0, 8)) +
                               b.y * float(bitfieldExtract(int(seen[v]), 8, 8)) +
                               b.z * float(bitfieldExtract(int(seen[v]), 16, 8)) +
                               b.w * float(bitfieldExtract(int(seen[v]), 24, 8));
-        precise float visible = field * (dimmer_visibility_slope / 127.0);
-        float clamped = visible > 0.0 ? (visible < 1.0 ? visible : 1.0) : 0.0;
+        visible[v] = field * (dimmer_visibility_slope / 127.0);
+        float clamped = visible[v] > 0.0 ? (visible[v] < 1.0 ? visible[v] : 1.0) : 0.0;
         weights[v] = b[v] * clamped;
     }
     precise float sum = weights.x + weights.y + weights.z + weights.w;
+    if (!(sum > dimmer_visible_weight_min)) {
+        float most = -2.0 * dimmer_visibility_slope;
+        for (int v = 0; v < 4; ++v)
+            if (b[v] > dimmer_visible_weight_min && visible[v] > most) most = visible[v];
+        for (int v = 0; v < 4; ++v) {
+            precise float above = visible[v] - (most - dimmer_least_hidden_span);
+            weights[v] = b[v] * (above > 0.0 ? above : 0.0);
+        }
+        sum = weights.x + weights.y + weights.z + weights.w;
+    }
     precise vec4 shares = weights * dimmer_reciprocal(sum);
-    return sum > dimmer_visible_weight_min ? shares : b;
+    return shares;
 }
 
 #endif
