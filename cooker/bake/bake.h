@@ -16,6 +16,7 @@ namespace dimmer::cook {
 // The global grid: see probes/placement.h.
 struct GridSettings {
     uint32_t probes_max = 0;     // 0: no grid
+    float probes_per_m3 = 0;     // of open space, at most; 0: one, in small levels more
     float min_spacing_m = 0.3f;  // of probes that see each other; twice that outside of play areas, where there are any
     uint32_t sites = 16;         // per probe, where light is traced: for placing probes, and for fitting their light
     uint32_t site_rays = 256;    // from each, all around, at least: they leave some 5 % of noise in irradiance
@@ -115,7 +116,7 @@ struct Baked {
     std::vector<std::string> warnings;
 };
 
-// Places in the open at which the global grid asks for light: all over the level, or around one lamp. See
+// Places in the open at which the global grid asks for light: all over the level, at surfaces, or around a lamp. See
 // probes/sites.h.
 struct SiteBlock {
     std::vector<glm::vec3> places_m;

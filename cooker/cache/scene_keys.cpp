@@ -233,7 +233,7 @@ Key placesKey(const Key& scene, std::span<const float> what) {
 
 Key gridSettingsKey(const GridSettings& s, const Scene& scene, const Box& air) {
     KeyBuilder key("grid settings");
-    key.add(s.probes_max).add(s.min_spacing_m).add(s.sites).add(s.site_rays).add(s.tolerance);
+    key.add(s.probes_max).add(s.probes_per_m3).add(s.min_spacing_m).add(s.sites).add(s.site_rays).add(s.tolerance);
     key.add(uint32_t{s.uniform}).add(uint32_t{s.fit}).add(uint32_t{s.visibility});
     addPlayAreas(key, scene);
     return add(add(key, air.min_m), air.max_m).finish();

@@ -30,6 +30,7 @@ BakeSettings bakeSettings(const Profile& profile, const Quality& quality, const 
                           .light_grid = quality.light_grid,
                           .per_set_passes = quality.per_set_passes,
                           .grid = {.probes_max = wantsGrid(profile, scene) ? profile.probes_max : 0,
+                                   .probes_per_m3 = profile.probes_per_m3,
                                    .min_spacing_m = profile.global_min_spacing_m,
                                    .sites = quality.probe_sites,
                                    .site_rays = quality.probe_rays,

@@ -54,6 +54,7 @@ struct Profile {
     std::map<std::string, float> set_thresholds;  // for single light sets, by name
     GridMode global_grid = GridMode::Auto;
     uint32_t probes_max = 20000;        // of the global grid; 0: no grid
+    float probes_per_m3 = 0;            // of open space; 0: GridSettings::probes_per_m3
     float global_min_spacing_m = 0.3f;  // between them
     float local_spacing_m = 0.4f;       // between the probes of a model's grid, at most
     uint32_t local_probes_max = 64;     // of one model's grid; above, they stand further apart

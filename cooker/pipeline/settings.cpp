@@ -218,9 +218,15 @@ std::vector<Setting> settingsOf(Profile& p) {
                     "whether the global grid is baked, which lights what has no lightmap. auto: where the level says "
                     "that something moves (a node with dimmer_dynamic, a mesh whose dimmer_lighting is dynamic, a "
                     "dimmer_play_area); on: always; off: never"});
-    list.push_back({"grids.probes_max", &p.probes_max, 0, 1 << 20,
-                    "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. One per cubic "
-                    "metre of open space is never exceeded"});
+    list.push_back(
+        {"grids.probes_max", &p.probes_max, 0, 1 << 20,
+         "light probes of the global grid at most; 0: no grid, and nothing that moves is lit. In most levels "
+         "grids.probes_per_m3 allows fewer"});
+    list.push_back({"grids.probes_per_m3", &p.probes_per_m3, 0, 64,
+                    "light probes of the global grid for each cubic metre of open space at most. 0: one, or up to four "
+                    "(and 32 besides) while that makes no more than 256. Small rooms with lamps that are baked in full "
+                    "gain most by "
+                    "more"});
     list.push_back({"grids.global_min_spacing", &p.global_min_spacing_m, 0.1, 1000,
                     "metres between probes of the global grid at least; light around a lamp changes over a hand's "
                     "breadth"});

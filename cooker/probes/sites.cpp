@@ -3,8 +3,6 @@
 #include <bake/direct.h>
 #include <bake/final_gather.h>
 #include <bake/sampling.h>
-#include <probes/free_space.h>
-#include <probes/tetrahedra.h>
 
 #include <algorithm>
 #include <bit>
@@ -15,170 +13,10 @@
 namespace dimmer::cook {
 namespace {
 
-// On average over the free space: the grid need not be denser to be as right as lightmaps are.
-constexpr double density_max_per_m3 = 1;
-// Small levels can have more sites, and need them, as single probes matter; large ones cannot pay for all that are
-// asked.
-constexpr double small_sites_per_probe = 40, small_sites = 4000;
-constexpr double many_sites = 60000, sites_per_probe_affordable = 5;
-constexpr uint32_t first_look = 8192;  // places that tell how much of the level is free
-constexpr uint32_t tries_per_site = 64;
-// Half of the places are near a lamp, where light changes over a hand's breadth: nearer than this many times the
-// spacing of the others, so that what lies around that is not left to chance.
-constexpr double share_near_lamps = 0.5;
-constexpr double lamp_reach_spacings = 2.2;
-constexpr float lamp_reach_min_m = 0.8f;
-// Light changes over lengths like the distance to surfaces (Ward and Heckbert 1992), and what asks for it moves near
-// them: places farther off than this many times the mean spacing of probes become rarer.
-constexpr double near_spacings = 0.8;
-constexpr uint32_t rarity_seed = 0x2c1b3c6du;
-// Small levels get up to four times the rays from each place, while all of them are no more than so many places' usual
-// ones: noise misleads where to put the few probes they have.
-constexpr uint32_t small_level_places = 15625, small_level_factor = 4;
 constexpr size_t sites_per_task = 64;
 constexpr uint32_t site_seed = 0x51ed270bu;
 // Of a light set, beside always-on light: sets are off at times.
 constexpr float weight_of_sets = 0.05f;
-
-class Chooser {
-   public:
-    Chooser(const RayScene& rays, const GridSettings& settings, GroupStore* store)
-        : rays_(rays), settings_(settings), store_(store) {
-        out_.air = airBox(rays);
-        for (const PunctualLight& light : rays.scene().lights)
-            if (light.type != LightType::Directional && light.bake != BakeMode::None &&
-                std::ranges::find(lamps_, light.position_m) == lamps_.end())
-                lamps_.push_back(light.position_m);
-    }
-
-    Expected<SiteChoice> run() {
-        const uint32_t wanted = decideCounts();
-        const uint32_t affordable =
-            std::clamp(small_level_places * settings_.site_rays / std::max(wanted, 1u), settings_.site_rays,
-                       small_level_factor * settings_.site_rays);
-        const uint32_t rays = (affordable + 1) / 2 * 2;  // in two halves
-        const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
-        out_.blocks.push_back({allOver(wanted - at_lamps), rays});
-        const auto lamps = static_cast<uint32_t>(lamps_.size());
-        for (const glm::vec3 lamp : lamps_)
-            if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
-                out_.blocks.push_back({around(lamp, count), rays});
-        if (std::ranges::all_of(out_.blocks, [](const SiteBlock& block) { return block.places_m.empty(); }))
-            return std::unexpected(Error{
-                ErrorCode::BadInput,
-                "no place in the level's box, nor in its play areas, is in the open: where most of what is around is "
-                "the back of a surface, or one is within 5 cm, no probe can stand"});
-        auto corners = freeCorners();
-        if (!corners) return std::unexpected(corners.error());
-        out_.blocks.push_back({std::move(*corners), rays});
-        return std::move(out_);
-    }
-
-   private:
-    // Of sites wanted.
-    uint32_t decideCounts() {
-        const auto free = remembered({static_cast<float>(first_look)}, [&] {
-            return chosen(
-                0, first_look, [&](uint32_t i) { return anywhere(i); },
-                [&](glm::vec3 p, uint32_t) { return inTheOpen(rays_, p); });
-        });
-        const glm::dvec3 size = glm::dvec3(out_.air.max_m) - glm::dvec3(out_.air.min_m);
-        out_.free_volume_m3 = static_cast<double>(free.size()) / first_look * size.x * size.y * size.z;
-        // The box's corners are probes too.
-        const double probes = std::floor(std::min(std::max(density_max_per_m3 * out_.free_volume_m3 - 8, 8.0),
-                                                  static_cast<double>(settings_.probes_max)));
-        out_.probes_max = static_cast<size_t>(probes);
-        const double least = std::min(small_sites_per_probe * probes, small_sites);
-        const double most = std::max(many_sites, sites_per_probe_affordable * probes);
-        const double wanted = std::clamp(settings_.sites * probes, least, most);
-        const double spacing_m = std::cbrt(out_.free_volume_m3 / ((1 - share_near_lamps) * wanted));
-        near_m_ = settings_.uniform || free.empty()
-                      ? far_away_m
-                      : static_cast<float>(near_spacings * std::cbrt(out_.free_volume_m3 / probes));
-        lamp_reach_m_ = std::max(lamp_reach_min_m, static_cast<float>(lamp_reach_spacings * spacing_m));
-        return static_cast<uint32_t>(wanted);
-    }
-
-    glm::vec3 anywhere(uint32_t i) const {
-        const glm::vec3 low = out_.air.min_m, size = out_.air.max_m - low;
-        return low + size * glm::vec3(radicalInverse(2, i + 1), radicalInverse(3, i + 1), radicalInverse(5, i + 1));
-    }
-    // Uniform in the distance, so that each shell around a lamp gets as many (but for what is far from surfaces): light
-    // there falls with its square.
-    glm::vec3 nearLamp(glm::vec3 lamp_m, uint32_t i) const {
-        const glm::vec3 u = sequence3d(i, site_seed);
-        return lamp_m + lamp_reach_m_ * u.z * uniformSphereDirection({u.x, u.y});
-    }
-
-    std::vector<glm::vec3> allOver(uint32_t count) const {
-        return sites({static_cast<float>(count), near_m_}, count, [&](uint32_t i) { return anywhere(i); });
-    }
-    std::vector<glm::vec3> around(glm::vec3 lamp_m, uint32_t count) const {
-        return sites({static_cast<float>(count), near_m_, lamp_reach_m_, lamp_m.x, lamp_m.y, lamp_m.z}, count,
-                     [&](uint32_t i) { return nearLamp(lamp_m, i); });
-    }
-    std::vector<glm::vec3> sites(const std::vector<float>& what, uint32_t count, auto&& at) const {
-        return remembered(what, [&] {
-            return first(count, at, [&](glm::vec3 p, uint32_t i) {
-                return p == glm::clamp(p, out_.air.min_m, out_.air.max_m) &&
-                       chosenInTheOpen(rays_, p, near_m_, unitFloat(hash(i, rarity_seed)));
-            });
-        });
-    }
-
-    // What an earlier cook found of the same. `what`: all that it depends on besides the level's geometry.
-    std::vector<glm::vec3> remembered(std::vector<float> what, auto&& find) const {
-        for (const glm::vec3 corner : {out_.air.min_m, out_.air.max_m})
-            what.insert(what.end(), {corner.x, corner.y, corner.z});
-        if (store_)
-            if (auto places = store_->findPlaces(what)) return std::move(*places);
-        const std::vector<glm::vec3> places = find();
-        if (store_) store_->keepPlaces(what, places);
-        return places;
-    }
-
-    // Of `count` places those that are `wanted`, in their order.
-    static std::vector<glm::vec3> chosen(uint32_t begin, uint32_t count, auto&& at, auto&& wanted) {
-        std::vector<uint8_t> is_wanted(count);
-        tbb::parallel_for(0u, count, [&](uint32_t i) { is_wanted[i] = wanted(at(begin + i), begin + i); });
-        std::vector<glm::vec3> places;
-        for (uint32_t i = 0; i < count; ++i)
-            if (is_wanted[i]) places.push_back(at(begin + i));
-        return places;
-    }
-
-    // The first `count` that are wanted of at most so many times as many.
-    static std::vector<glm::vec3> first(uint32_t count, auto&& at, auto&& wanted) {
-        std::vector<glm::vec3> places;
-        const uint32_t tries = tries_per_site * count;
-        for (uint32_t tried = 0; places.size() < count && tried < tries;) {
-            const uint32_t block = std::min(std::clamp(count, 64u, 4096u), tries - tried);
-            for (const glm::vec3 p : chosen(tried, block, at, wanted))
-                if (places.size() < count) places.push_back(p);
-            tried += block;
-        }
-        return places;
-    }
-
-    Expected<std::vector<glm::vec3>> freeCorners() {
-        const auto box = tetrahedralise({}, out_.air);
-        if (!box) return std::unexpected(box.error());
-        std::vector<glm::vec3> corners;
-        for (const ProbePosition& p : box->positions) {
-            const glm::vec3 corner(p.x_m, p.y_m, p.z_m);
-            out_.corner_free.push_back(inTheOpen(rays_, corner));
-            if (out_.corner_free.back()) corners.push_back(corner);
-        }
-        return corners;
-    }
-
-    const RayScene& rays_;
-    const GridSettings& settings_;
-    GroupStore* store_;
-    std::vector<glm::vec3> lamps_;
-    float lamp_reach_m_ = 0, near_m_ = 0;
-    SiteChoice out_;
-};
 
 // Light at places, of some groups. One worker's scratch.
 class PlaceTrace {
@@ -213,11 +51,12 @@ class PlaceTrace {
         const GatherFrom from = Gatherer::atProbe(point, seed);
         const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, full_);
         const bool known = ends && ends->ends[0] != RayEnd::unknown;
+        // Halves of one sequence would fill each other's gaps: what one found the other would be less likely to.
         for (const uint32_t first_ray : {0u, rays / 2}) {
             gatherer_.gather(from,
                              {.rays = rays / 2,
                               .emitter_samples = settings_.emitter_samples * rays / 2 / rays_per_round,
-                              .seed = settings_.seed + 2,
+                              .seed = settings_.seed + (first_ray == 0 ? 2 : 5),
                               .first_ray = first_ray,
                               .wanted_in_group = wanted_in_group_,
                               .row = ends},
@@ -253,7 +92,7 @@ class PlaceTrace {
     std::span<const TermReport> reports_;
     const BakeSettings& settings_;
     TermAccumulator<ProbeLight> sum_, direct_, full_;  // the last: direct light of lamps that are baked in full
-    std::vector<float> first_half_lux_;  // per term, of what rays found; 0 between places
+    std::vector<float> first_half_lux_;                // per term, of what rays found; 0 between places
     std::vector<uint32_t> wanted_in_group_;
 };
 
@@ -360,28 +199,6 @@ std::vector<float> weightsOfGroups(std::span<const uint32_t> wholes, const Spars
 }
 
 }  // namespace
-
-std::vector<SiteRow> siteOrder(std::span<const SiteBlock> blocks) {
-    std::vector<SiteRow> order;
-    if (blocks.empty()) return order;
-    for (size_t b = 0; b + 1 < blocks.size(); ++b)
-        for (size_t i = 0; i < blocks[b].places_m.size(); ++i) order.push_back({b, i});
-    std::ranges::stable_sort(order, {}, [&](const SiteRow& r) {
-        return (static_cast<double>(r.row) + 0.5) / static_cast<double>(blocks[r.block].places_m.size());
-    });
-    for (size_t i = 0; i < blocks.back().places_m.size(); ++i) order.push_back({blocks.size() - 1, i});
-    return order;
-}
-
-std::vector<glm::vec3> SiteChoice::places() const {
-    std::vector<glm::vec3> all;
-    for (const SiteRow& r : siteOrder(blocks)) all.push_back(blocks[r.block].places_m[r.row]);
-    return all;
-}
-
-Expected<SiteChoice> chooseSites(const RayScene& rays, const GridSettings& settings, GroupStore* store) {
-    return Chooser(rays, settings, store).run();
-}
 
 SiteLight::SiteLight(std::span<const SiteBlock> blocks, const DoorPaths& paths, GroupStore* store)
     : blocks_(blocks),

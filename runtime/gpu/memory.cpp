@@ -31,15 +31,6 @@ std::array<VkMemoryPropertyFlags, 2> wanted(MemoryUse use) {
     return {host, host};
 }
 
-VkDeviceSize allocationBytesMax(VkPhysicalDevice device) {
-    auto allocations =
-        vkStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
-    auto properties =
-        vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
-    vkGetPhysicalDeviceProperties2(device, &properties);
-    return allocations.maxMemoryAllocationSize;
-}
-
 Expected<MemoryHandle> allocate(const VulkanContext& vulkan, const VkMemoryRequirements& requirements, MemoryUse use) {
     const VkDeviceSize bytes_max = allocationBytesMax(vulkan.physical_device);
     if (requirements.size > bytes_max)
@@ -74,6 +65,15 @@ void share(const VulkanContext& vulkan, std::array<uint32_t, 2>& families, Info&
 }
 
 }  // namespace
+
+VkDeviceSize allocationBytesMax(VkPhysicalDevice device) {
+    auto allocations =
+        vkStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
+    auto properties =
+        vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
+    vkGetPhysicalDeviceProperties2(device, &properties);
+    return allocations.maxMemoryAllocationSize;
+}
 
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
                                  MemoryUse use) {

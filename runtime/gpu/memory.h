@@ -27,6 +27,9 @@ enum class MemoryUse {
     Readback,  // written by the GPU, read by the host
 };
 
+// What the device allocates at a time. 0: its instance is for a Vulkan before 1.1, where nobody says.
+VkDeviceSize allocationBytesMax(VkPhysicalDevice device);
+
 // Both may be used on the context's queue and on its compute queue. Unsupported: larger than the device allocates at a
 // time.
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,

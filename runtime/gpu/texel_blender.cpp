@@ -71,15 +71,12 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t a
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             std::span<const LightmapPages> page_sets, Transfer& transfer,
                                             const RuntimeOptions& options) {
-    auto allocations =
-        vkStruct<VkPhysicalDeviceMaintenance3Properties>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MAINTENANCE_3_PROPERTIES);
-    auto properties =
-        vkStruct<VkPhysicalDeviceProperties2>(VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &allocations);
-    vkGetPhysicalDeviceProperties2(vulkan.physical_device, &properties);
-    const VkPhysicalDeviceLimits& limits = properties.properties.limits;
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits& limits = properties.limits;
+    const VkDeviceSize allocation_max = allocationBytesMax(vulkan.physical_device);
     DevicePlaces places = placesOf(data);
-    DIMMER_TRY(
-        checkTexelLimits(limits, allocations.maxMemoryAllocationSize, places, planner, options.records_bytes_max));
+    DIMMER_TRY(checkTexelLimits(limits, allocation_max, places, planner, options.records_bytes_max));
     TexelBlender blender;
     blender.groups_x_max_ = limits.maxComputeWorkGroupCount[0];
     blender.per_combination_ = options.mode == UpdateMode::PerCombination;

@@ -97,8 +97,8 @@ Expected<void> check(const Transform& transform) {
     return {};
 }
 
-// What stands on a floor or against a wall has a face of its box in theirs, where light of both sides meets: probes keep
-// off it.
+// What stands on a floor or against a wall has a face of its box in theirs, where light of both sides meets: probes
+// keep off it.
 float insetM(const ModelGrid& grid, size_t axis) {
     constexpr float most_m = 0.05f, most_of_side = 0.1f;
     return std::min(most_m, most_of_side * (grid.max_m[axis] - grid.min_m[axis]));
@@ -111,8 +111,7 @@ float spacing(const ModelGrid& grid, size_t axis) {
 
 // A single probe stands in the middle.
 float firstAlong(const ModelGrid& grid, size_t axis) {
-    return grid.counts[axis] < 2 ? 0.5f * (grid.min_m[axis] + grid.max_m[axis])
-                                 : grid.min_m[axis] + insetM(grid, axis);
+    return grid.counts[axis] < 2 ? 0.5f * (grid.min_m[axis] + grid.max_m[axis]) : grid.min_m[axis] + insetM(grid, axis);
 }
 
 Vec3 stepOf(const ModelGrid& grid, const Transform& t, size_t axis) {

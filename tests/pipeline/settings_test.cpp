@@ -62,7 +62,7 @@ TEST(Settings, TheSchemaHoldsEveryDefault) {
     std::map<std::string, json> defaults = {
         {"/budgets/base_lightmaps", 0}, {"/budgets/global_grid", 0},     {"/budgets/local_grids", 0},
         {"/budgets/per_element", 0},    {"/records/door_share", 0.2},    {"/records/overlap_max", 0},
-        {"/grids/global", "auto"},      {"/grids/local_probes_max", 64},
+        {"/grids/global", "auto"},      {"/grids/local_probes_max", 64}, {"/grids/probes_per_m3", 0},
     };
     for (const auto& [place, value] : desktop.items())
         if (place != "/$schema" && place != "/description") defaults[place] = value;

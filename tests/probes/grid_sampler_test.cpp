@@ -180,9 +180,22 @@ TEST(GridSampler, WhatAProbeDoesNotSeeItDoesNotLight) {
     // On its own side, further than 1 / visibility_slope from the plane, all of it.
     place.barycentric = {0.1f, 0.4f, 0.3f, 0.2f};
     EXPECT_NEAR(probeWeights(grid, place)[1], 0.4, 1e-6);
-    // Seen by none: plain barycentric.
+    // Seen by none, and hidden alike from all: plain barycentric.
     for (auto& probe : seen) probe = {-127, -127, -127, -127};
-    EXPECT_EQ(probeWeights(grid, place), place.barycentric);
+    for (size_t v = 0; v < 4; ++v) EXPECT_NEAR(probeWeights(grid, place)[v], place.barycentric[v], 1e-6);
+    // On the floor: hidden by a rounding from two probes above it, by the floor's thickness from the others.
+    seen[0] = seen[1] = {-1, -1, -1, -1};
+    seen[2] = seen[3] = {-20, -20, -20, -20};
+    weights = probeWeights(grid, place);
+    EXPECT_NEAR(weights[0], 0.1 / 0.5, 1e-6);
+    EXPECT_NEAR(weights[1], 0.4 / 0.5, 1e-6);
+    EXPECT_EQ(weights[2], 0);
+    EXPECT_EQ(weights[3], 0);
+    // Of one without a share nothing is asked.
+    place.barycentric = {0, 0, 0.3f, 0.7f};
+    weights = probeWeights(grid, place);
+    EXPECT_NEAR(weights[2], 0.3, 1e-6);
+    EXPECT_NEAR(weights[3], 0.7, 1e-6);
 }
 
 // What a shader resamples is what radiance() says, within the steps of the format: a 9-bit mantissa, and half of

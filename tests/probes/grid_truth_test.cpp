@@ -46,6 +46,7 @@ TEST(GridTruth, TwoRooms) {
         auto profile = *loadProfile("desktop");
         profile.global_grid = GridMode::On;  // nothing moves there
         profile.global_min_spacing_m = spacing_m;
+        profile.probes_per_m3 = 1;
         auto data = cookScene(*scene, profile, "draft", progress, stats);
         ASSERT_TRUE(data) << data.error().message;
         const auto pack = Pack::fromData(std::move(*data));

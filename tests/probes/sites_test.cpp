@@ -49,8 +49,8 @@ TEST(Sites, ASmallRoomInAVastLevelStillHasSome) {
     scene.lights.emplace_back().position_m = {0, 1, 0};
     const auto choice = chooseSites(RayScene(scene), {.probes_max = 100, .sites = 8}, nullptr);
     ASSERT_TRUE(choice);
-    ASSERT_EQ(choice->blocks.size(), 3u);
-    EXPECT_GT(choice->blocks[1].places_m.size(), 50u);
+    ASSERT_EQ(choice->blocks.size(), 4u);
+    EXPECT_GT(choice->blocks[2].places_m.size(), 50u);
 }
 
 // A hall of 24 m each way with a probe for each 8 m3, and so near its walls within 1.6 m. At distance d from them lie
@@ -63,7 +63,7 @@ TEST(Sites, StandMoreCloselyNearSurfaces) {
         const auto choice = chooseSites(rays, {.probes_max = 1728, .sites = 8, .uniform = uniform}, nullptr);
         EXPECT_TRUE(choice);
         const std::vector<glm::vec3>& places = choice->blocks[0].places_m;
-        EXPECT_EQ(places.size(), 13824u);
+        EXPECT_EQ(places.size(), uniform ? 13824u : 11060u);  // a fifth of them at surfaces
         const auto far = std::ranges::count_if(places, [](glm::vec3 p) {
             return 12 - std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) > 2;
         });
@@ -77,6 +77,52 @@ TEST(Sites, StandMoreCloselyNearSurfaces) {
     const double expected = beyond / (near_walls + between + beyond);  // of (12 - d)^2 min(1, near / d)
     EXPECT_LT(far_share(false), expected + 0.015);
     EXPECT_GT(far_share(false), expected * 0.9 - 0.015);
+}
+
+// Of a room, however it stands: a third at one of its surfaces, a third along an edge, a third in a corner, all as near
+// as things stand there and no nearer than probes may.
+TEST(Sites, AFifthLieAtSurfacesEdgesAndCorners) {
+    for (const float angle : {0.0f, 0.5f}) {
+        const glm::vec3 u(std::cos(angle), 0, std::sin(angle)), v(0, 1, 0), w = glm::cross(u, v);
+        Scene scene;
+        addBox(scene, {6, 2, 4}, addMaterial(scene, lambert(0.5f)));
+        for (SceneMesh& mesh : scene.meshes)
+            for (glm::vec3& p : mesh.positions_m) p = p.x * u + p.y * v + p.z * w;
+        const auto choice = chooseSites(RayScene(scene), {.probes_max = 300, .sites = 16}, nullptr);
+        ASSERT_TRUE(choice);
+        const std::vector<glm::vec3>& places = choice->blocks[1].places_m;
+        EXPECT_EQ(places.size(), (choice->blocks[0].places_m.size() + places.size()) / 5);
+        std::array<size_t, 4> at{};  // per number of surfaces
+        for (const glm::vec3 p : places) {
+            const glm::vec3 off_m =
+                glm::vec3(6, 2, 4) - glm::abs(glm::vec3(glm::dot(p, u), glm::dot(p, v), glm::dot(p, w)));
+            size_t surfaces = 0;
+            for (int c = 0; c < 3; ++c) {
+                EXPECT_GT(off_m[c], 0.045f);  // 5 cm, but rays see walls up to a tenth too far
+                surfaces += off_m[c] < 0.0851f;
+            }
+            ++at[surfaces];
+        }
+        // Some of those for one surface happen to lie near another as well; grazing ways end a little further off.
+        for (const size_t surfaces : {1, 2, 3})
+            EXPECT_NEAR(static_cast<double>(at[surfaces]), static_cast<double>(places.size()) / 3,
+                        0.06 * static_cast<double>(places.size()))
+                << surfaces << " at " << angle;
+    }
+}
+
+TEST(Sites, ProbesPerCubicMetreAreWhatIsAskedFor) {
+    Scene scene;
+    addBox(scene, {2, 1.5f, 2}, addMaterial(scene, lambert(0.5f)));  // 48 m3, less 5 cm along the walls
+    const RayScene rays(scene);
+    const auto probes = [&](float per_m3, uint32_t most = 20000) {
+        const auto choice = chooseSites(rays, {.probes_max = most, .probes_per_m3 = per_m3, .sites = 4}, nullptr);
+        return static_cast<double>(choice->probes_max + 8) / choice->free_volume_m3;
+    };
+    EXPECT_NEAR(probes(1), 1, 0.03);
+    EXPECT_NEAR(probes(8), 8, 0.03);
+    EXPECT_NEAR(probes(0), 4 + 32 / 42.5, 0.1);  // so small a level
+    EXPECT_LT(probes(8, 60), 2);
 }
 
 // A set that can be off counts a twentieth of what never is; bright or dim, as all count by their own mean; and taken

@@ -68,6 +68,28 @@ TEST(Models, AModelIsLitByTheLightWhereItStands) {
     }
 }
 
+// A person whose soles lie in the floor's plane, where a place may count as below it: the lowest probes stand above.
+// Their light is that of where they stand, and the soles have theirs.
+TEST(Models, ProbesKeepOffTheFloorThatTheModelStandsOn) {
+    const Pack pack = packOf(
+        test::modelPack(1, 800, [](glm::vec3 p) { return glm::vec3(dcOf((1 + std::clamp(p.y, 0.0f, 4.0f)) / 64)); }));
+    CpuRuntime runtime(pack, 1, 64);
+    const Model model = *runtime.addModel({{-0.25f, 0, -0.25f}, {0.25f, 1.8f, 0.25f}, {2, 2, 2}}, at(6, 1, 6));
+    runtime.update();
+    const ModelSlot slot = *runtime.modelSlot(model);
+    const GridSampler sampler(pack, runtime.probes());
+    for (const auto& [y, lit_as_at] : {std::pair(1.0f, 1.05f), {1.05f, 1.05f}, {2, 2}, {2.75f, 2.75f}, {2.8f, 2.75f}}) {
+        const float expected = (1 + lit_as_at) * std::numbers::pi_v<float>;
+        EXPECT_NEAR(sampler.sample(slot, {6, y, 6}, {0, 1, 0})[1], expected, 0.005f * expected) << y;  // as above
+    }
+    // Of a ball of 10 cm no more than a tenth of it.
+    const Model ball = *runtime.addModel({{-0.05f, 0, -0.05f}, {0.05f, 0.1f, 0.05f}, {2, 2, 2}}, at(6, 1, 6));
+    runtime.update();
+    const float expected = (1 + 1.01f) * std::numbers::pi_v<float>;
+    EXPECT_NEAR(GridSampler(pack, runtime.probes()).sample(*runtime.modelSlot(ball), {6, 1, 6}, {0, 1, 0})[1], expected,
+                0.001f * expected);
+}
+
 TEST(Models, FarOutsideTheyHaveTheLightOfTheNearestPoint) {
     const Pack pack = packOf(gradientPack());
     CpuRuntime runtime(pack, 1, 8);

@@ -103,5 +103,32 @@ TEST_F(VulkanFunctionsGpu, OneThatIsMissingIsNamed) {
     EXPECT_THAT(refused.error().message, HasSubstr("vkWaitSemaphores"));
 }
 
+TEST_F(VulkanFunctionsGpu, AnInstanceForVulkanOneIsTold) {
+    VkApplicationInfo application{};
+    application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+    application.apiVersion = VK_API_VERSION_1_0;
+    VkInstanceCreateInfo info{};
+    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+    info.pApplicationInfo = &application;
+    const auto function = [](VkInstance of, auto& pointer, const char* name) {
+        pointer = reinterpret_cast<std::remove_reference_t<decltype(pointer)>>(vkGetInstanceProcAddr(of, name));
+    };
+    PFN_vkCreateInstance create = nullptr;
+    PFN_vkEnumeratePhysicalDevices enumerate = nullptr;
+    PFN_vkDestroyInstance destroy = nullptr;
+    function(VK_NULL_HANDLE, create, "vkCreateInstance");
+    VulkanContext vulkan = device().context();
+    ASSERT_EQ(create(&info, nullptr, &vulkan.instance), VK_SUCCESS);
+    function(vulkan.instance, enumerate, "vkEnumeratePhysicalDevices");
+    function(vulkan.instance, destroy, "vkDestroyInstance");
+    uint32_t count = 1;
+    ASSERT_GE(enumerate(vulkan.instance, &count, &vulkan.physical_device), VK_SUCCESS);
+    const auto refused = Runtime::create(vulkan, test::packOf(test::randomPack(1)));
+    destroy(vulkan.instance, nullptr);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+    EXPECT_THAT(refused.error().message, HasSubstr("VkApplicationInfo::apiVersion"));
+}
+
 }  // namespace
 }  // namespace dimmer

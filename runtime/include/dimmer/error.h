@@ -6,6 +6,10 @@
 #include <string>
 #include <utility>
 
+#ifndef __cpp_lib_expected
+#error "Dimmer's headers need C++23: std::expected. Compile with -std=c++23 (CMake: target_link_libraries sets it)."
+#endif
+
 namespace dimmer {
 
 enum class ErrorCode {

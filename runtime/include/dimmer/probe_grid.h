@@ -17,7 +17,8 @@ struct Radiance {
     std::array<std::array<float, 3>, 9> coefficients = {};
 };
 
-// Irradiance in lux on a surface with this unit normal; never negative.
+// Irradiance in lux on a surface with this unit normal; never negative. Of a normal that is not finite it is not
+// either.
 std::array<float, 3> irradiance(const Radiance& radiance, std::array<float, 3> normal);
 
 // The same on a surface that knows what of its surroundings it sees.
