@@ -51,12 +51,13 @@ class PlaceTrace {
         const GatherFrom from = Gatherer::atProbe(point, seed);
         const uint64_t shadow_rays = directLight(gatherer_, lights_, from, direct_, full_);
         const bool known = ends && ends->ends[0] != RayEnd::unknown;
-        // Halves of one sequence would fill each other's gaps: what one found the other would be less likely to.
+        // Halves of one sequence fill each other's gaps: of light that one finds the other finds less. Of two sequences
+        // they would be independent, and noise larger (decisions.md).
         for (const uint32_t first_ray : {0u, rays / 2}) {
             gatherer_.gather(from,
                              {.rays = rays / 2,
                               .emitter_samples = settings_.emitter_samples * rays / 2 / rays_per_round,
-                              .seed = settings_.seed + (first_ray == 0 ? 2 : 5),
+                              .seed = settings_.seed + 2,
                               .first_ray = first_ray,
                               .wanted_in_group = wanted_in_group_,
                               .row = ends},

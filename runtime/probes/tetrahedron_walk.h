@@ -13,7 +13,8 @@ namespace dimmer {
 // models move a little at a time, and a start cell holds few tetrahedra. No table can make a walk longer.
 inline constexpr uint32_t hinted_steps_max = 32, walk_steps_max = 1024;
 // A barycentric coordinate above -this counts as inside. Rounding errs by some 1e-6 in tetrahedra that are not slivers;
-// the light jumps by at most this share where two tetrahedra disagree.
+// weights jump by at most this share where two tetrahedra disagree, but for what their tables say is seen: those of
+// neighbours need not agree at a face, and near doors light jumps there by up to a tenth.
 inline constexpr float inside_tolerance = 1e-4f;
 // So near to a face, neighbours are compared: of those that take a point in, the one that it is deepest in gives the
 // light. Round an edge there are many, and a few steps need not find it: there, a walk ignores its hint.
