@@ -320,7 +320,7 @@ def front_table(levels):
 
 
 def grids_of(level):
-    """Each number of probes once: more than one per cubic metre of air are never placed."""
+    """Each number of probes once: more than grids.probes_per_m3 allows are never placed."""
     return list({(f["uniform"], f["probes"]): f for f in level.results.values() if "grid" in f}.values())
 
 

@@ -186,6 +186,7 @@ int run(const CookArguments& a) {
     options.cache = cacheOf(a);
     CookResult failed;
     auto result = cook(options, *progress, &failed);
+    progress->finish();  // of a stage that failed
     for (const std::string& warning : result ? result->stats.warnings : failed.stats.warnings) progress->warn(warning);
     const auto files = filesThere(inputs);
     if (!result) return reportFailure(a, files, result.error(), failed);

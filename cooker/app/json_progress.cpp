@@ -31,7 +31,7 @@ void JsonProgress::advance(uint64_t steps) {
 
 void JsonProgress::warn(std::string_view warning) {
     const std::scoped_lock lock(mutex_);
-    warnings_.say(warning);
+    if (warnings_.isNew(warning)) sayWarning(warning);
 }
 
 void JsonProgress::finish() {

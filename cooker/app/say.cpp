@@ -1,7 +1,6 @@
 #include <app/say.h>
 
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -27,12 +26,12 @@ void sayMessage(std::string_view message) noexcept {
     funlockfile(stderr);
 }
 
-void sayWarnings(std::span<const std::string> warnings) {
-    for (const std::string& warning : warnings) sayMessage("warning: " + warning);
+void sayWarning(std::string_view warning) {
+    sayMessage("warning: " + std::string(warning));
 }
 
-void WarningsOnce::say(std::string_view warning) {
-    if (said_.emplace(warning).second) sayMessage(fmt::format("warning: {}", warning));
+void sayWarnings(std::span<const std::string> warnings) {
+    for (const std::string& warning : warnings) sayWarning(warning);
 }
 
 void keepClosedStreamsClosed() noexcept {

@@ -1,4 +1,4 @@
-// What goes to stderr. Where that is closed or full it is lost and the work goes on: nothing here throws.
+// What goes to stderr. Where that is closed or full it is lost and the work goes on.
 #pragma once
 
 #include <functional>
@@ -15,12 +15,13 @@ void say(std::string_view text) noexcept;
 // A message: every line of it on its own, behind "dimmer: ", so that it can be told from lines of progress.
 void sayMessage(std::string_view message) noexcept;
 
+void sayWarning(std::string_view warning);
 void sayWarnings(std::span<const std::string> warnings);
 
-// Says a warning the first time that it comes.
+// Tells warnings that come for the first time.
 class WarningsOnce {
    public:
-    void say(std::string_view warning);
+    bool isNew(std::string_view warning) { return said_.emplace(warning).second; }
 
    private:
     std::set<std::string, std::less<>> said_;

@@ -36,8 +36,9 @@ void TerminalProgress::advance(uint64_t steps) {
 
 void TerminalProgress::warn(std::string_view warning) {
     const std::scoped_lock lock(mutex_);
+    if (!warnings_.isNew(warning)) return;
     if (terminal_) say("\r\x1b[K");
-    warnings_.say(warning);
+    sayWarning(warning);
     if (terminal_ && !name_.empty()) draw();
 }
 

@@ -117,7 +117,7 @@ struct Baked {
 };
 
 // Places in the open at which the global grid asks for light: all over the level, at surfaces, or around a lamp. See
-// probes/sites.h.
+// probes/site_choice.h.
 struct SiteBlock {
     std::vector<glm::vec3> places_m;
     uint32_t rays = 0;  // from each place

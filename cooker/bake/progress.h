@@ -12,7 +12,7 @@ class Progress {
     // Starts a stage of `total` steps and ends the one before it.
     virtual void stage(std::string_view name, uint64_t total) = 0;
     virtual void advance(uint64_t steps) = 0;
-    // Of the input, before the long work: who reads it may stop and mend it. To be said once, however often it comes.
+    // As early as it is known: who reads it may stop and mend the level. To be said once, however often it comes.
     virtual void warn(std::string_view warning) = 0;
     // Ends the last stage.
     virtual void finish() = 0;

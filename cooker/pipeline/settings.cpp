@@ -225,8 +225,7 @@ std::vector<Setting> settingsOf(Profile& p) {
     list.push_back({"grids.probes_per_m3", &p.probes_per_m3, 0, 64,
                     "light probes of the global grid for each cubic metre of open space at most. 0: one, or up to four "
                     "(and 32 besides) while that makes no more than 256. Small rooms with lamps that are baked in full "
-                    "gain most by "
-                    "more"});
+                    "gain most by more"});
     list.push_back({"grids.global_min_spacing", &p.global_min_spacing_m, 0.1, 1000,
                     "metres between probes of the global grid at least; light around a lamp changes over a hand's "
                     "breadth"});

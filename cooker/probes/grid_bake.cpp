@@ -93,7 +93,7 @@ class TermFit {
         }
         fitProbes(sites_, targets_, probes, fit_tolerance, own);
         for (size_t i = 0; i < members.size(); ++i)
-            members[i].light->light.radiance = std::bit_cast<std::array<glm::vec3, 9>>(probes[i]);
+            *members[i].light = {members[i].light->term, {std::bit_cast<std::array<glm::vec3, 9>>(probes[i])}, 0, 0};
     }
 
    private:

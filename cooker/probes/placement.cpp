@@ -226,7 +226,7 @@ class Placer {
         return true;
     }
 
-    // From places all over the level before those near lamps, which would crowd there.
+    // From places all over the level, and those at surfaces, before those near lamps, which would crowd there.
     void placeCoarse() {
         std::vector<uint32_t> by_block(trial_.placeCount());
         std::iota(by_block.begin(), by_block.end(), 0u);

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace dimmer::cook {
 namespace {
@@ -28,6 +29,7 @@ constexpr double lamp_reach_spacings = 2.2;
 // are all behind a wall or a floor is found by nothing else (that strip is a thousandth of a room).
 constexpr double share_at_surfaces = 0.2;
 constexpr float off_surface_min_m = 0.055f, off_surface_max_m = 0.085f;  // beyond probe_clearance_m
+constexpr glm::vec3 nowhere(std::numeric_limits<float>::quiet_NaN());    // in no box
 constexpr float lamp_reach_min_m = 0.8f;
 // Light changes over lengths like the distance to surfaces (Ward and Heckbert 1992), and what asks for it moves near
 // them: places farther off than this many times the mean spacing of probes become rarer.
@@ -121,24 +123,28 @@ class Chooser {
     // A third at a surface, a third along an edge, a third in a corner of three surfaces.
     std::vector<glm::vec3> atSurfaces(uint32_t count) const {
         return sites({static_cast<float>(count), near_m_, off_surface_max_m}, count,
-                     [&](uint32_t i) { return atSurface(anywhere(i), i, 1 + i % 3); });
+                     [&](uint32_t i) { return atSurface(i); });
     }
     // From a place on in some direction to a surface, along that to the next, along both to a third.
-    glm::vec3 atSurface(glm::vec3 p, uint32_t i, uint32_t surfaces) const {
+    glm::vec3 atSurface(uint32_t i) const {
         const uint32_t seed = hash(i, surface_seed);
+        // By chance: the place's height follows from the last digits of its number.
+        const uint32_t surfaces = 1 + hash(seed, 8) % 3;
         const float off_m = off_surface_min_m + (off_surface_max_m - off_surface_min_m) * unitFloat(hash(seed, 0));
-        glm::vec3 direction = uniformSphereDirection(sequence2d(i, surface_seed)), first(0);
+        glm::vec3 p = anywhere(i), direction = uniformSphereDirection(sequence2d(i, surface_seed)), before(0);
         for (uint32_t s = 0; s < surfaces; ++s) {
             const auto hit = rays_.nearest(p, direction, far_away_m, hash(seed, 1 + s));
-            if (!hit || hit->back) return p;
-            const glm::vec3 normal = rays_.triangles()[hit->triangle].normal;
+            const LevelTriangle* met = hit ? &rays_.triangles()[hit->triangle] : nullptr;
+            const bool solid_back = met && hit->back && !rays_.scene().materials[met->material].double_sided;
+            if (!met || solid_back) return s == 0 ? nowhere : p;
+            const glm::vec3 normal = hit->back ? -met->normal : met->normal;
             const float back_m = off_m / std::max(-glm::dot(normal, direction), 1e-3f);
             p += std::max(hit->distance_m - back_m, 0.0f) * direction;
             const glm::vec3 along =
-                s == 0 ? direction - glm::dot(direction, normal) * normal : glm::cross(first, normal);
+                s == 0 ? direction - glm::dot(direction, normal) * normal : glm::cross(before, normal);
             if (!(glm::dot(along, along) > 1e-6f)) return p;
             direction = glm::normalize(along) * (s > 0 && hash(seed, 7) % 2 ? -1.0f : 1.0f);
-            first = normal;
+            before = normal;
         }
         return p;
     }
@@ -169,10 +175,13 @@ class Chooser {
     // Of `count` places those that are `wanted`, in their order.
     static std::vector<glm::vec3> chosen(uint32_t begin, uint32_t count, auto&& at, auto&& wanted) {
         std::vector<uint8_t> is_wanted(count);
-        tbb::parallel_for(0u, count, [&](uint32_t i) { is_wanted[i] = wanted(at(begin + i), begin + i); });
-        std::vector<glm::vec3> places;
+        std::vector<glm::vec3> all(count), places;
+        tbb::parallel_for(0u, count, [&](uint32_t i) {
+            all[i] = at(begin + i);
+            is_wanted[i] = wanted(all[i], begin + i);
+        });
         for (uint32_t i = 0; i < count; ++i)
-            if (is_wanted[i]) places.push_back(at(begin + i));
+            if (is_wanted[i]) places.push_back(all[i]);
         return places;
     }
 

@@ -36,7 +36,6 @@ class PlaceTrace {
         for (uint32_t t = 0; t < gatherer.paths().termCount(); ++t) {
             const uint32_t group = gatherer.paths().terms()[t].group;
             sum_.setWanted(t, groups[group] != 0);
-            full_.setWanted(t, groups[group] != 0);
             wanted_in_group_[group] += groups[group];
         }
     }
@@ -54,21 +53,21 @@ class PlaceTrace {
         // Halves of one sequence fill each other's gaps: of light that one finds the other finds less. Of two sequences
         // they would be independent, and noise larger (decisions.md).
         for (const uint32_t first_ray : {0u, rays / 2}) {
-            gatherer_.gather(from,
-                             {.rays = rays / 2,
-                              .emitter_samples = settings_.emitter_samples * rays / 2 / rays_per_round,
-                              .seed = settings_.seed + 2,
-                              .first_ray = first_ray,
-                              .wanted_in_group = wanted_in_group_,
-                              .row = ends},
-                             &radiance_, sum_, nullptr);
+            gatherer_.gather(
+                from,
+                {.rays = rays / 2,
+                 .emitter_samples = (settings_.emitter_samples * (rays / 2) + rays_per_round - 1) / rays_per_round,
+                 .seed = settings_.seed + 2,
+                 .first_ray = first_ray,
+                 .wanted_in_group = wanted_in_group_,
+                 .row = ends},
+                &radiance_, sum_, nullptr);
             if (first_ray > 0) continue;
             for (const uint32_t t : sum_.touched()) first_half_lux_[t] = luminance(sum_[t].irradiance());
         }
         if (sum_.wants(always_group)) sum_[always_group];  // every site has some
-        for (auto* direct : {&direct_, &full_})
-            for (const uint32_t t : direct->touched())
-                if (sum_.wants(t)) sum_[t];
+        for (const uint32_t t : direct_.touched())
+            if (sum_.wants(t)) sum_[t];
         row.reserve(sum_.touched().size());
         for (const uint32_t t : sum_.touched()) {
             if (!sum_.wants(t)) continue;

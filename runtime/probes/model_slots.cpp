@@ -98,29 +98,31 @@ Expected<void> check(const Transform& transform) {
 }
 
 // What stands on a floor or against a wall has a face of its box in theirs, where light of both sides meets: probes
-// keep off it.
-float insetM(const ModelGrid& grid, size_t axis) {
+// keep off it. In the model's units.
+float insetOf(const ModelGrid& grid, const Transform& t, size_t axis) {
     constexpr float most_m = 0.05f, most_of_side = 0.1f;
-    return std::min(most_m, most_of_side * (grid.max_m[axis] - grid.min_m[axis]));
+    const float unit_m = std::hypot(t.rows[0][axis], t.rows[1][axis], t.rows[2][axis]);
+    return std::min(most_m / unit_m, most_of_side * (grid.max_m[axis] - grid.min_m[axis]));
 }
 
-float spacing(const ModelGrid& grid, size_t axis) {
-    const float side = grid.max_m[axis] - grid.min_m[axis] - 2 * insetM(grid, axis);
+float spacing(const ModelGrid& grid, const Transform& t, size_t axis) {
+    const float side = grid.max_m[axis] - grid.min_m[axis] - 2 * insetOf(grid, t, axis);
     return grid.counts[axis] < 2 ? 0 : side / static_cast<float>(grid.counts[axis] - 1);
 }
 
 // A single probe stands in the middle.
-float firstAlong(const ModelGrid& grid, size_t axis) {
-    return grid.counts[axis] < 2 ? 0.5f * (grid.min_m[axis] + grid.max_m[axis]) : grid.min_m[axis] + insetM(grid, axis);
+float firstAlong(const ModelGrid& grid, const Transform& t, size_t axis) {
+    return grid.counts[axis] < 2 ? 0.5f * (grid.min_m[axis] + grid.max_m[axis])
+                                 : grid.min_m[axis] + insetOf(grid, t, axis);
 }
 
 Vec3 stepOf(const ModelGrid& grid, const Transform& t, size_t axis) {
-    const float step = spacing(grid, axis);
+    const float step = spacing(grid, t, axis);
     return {t.rows[0][axis] * step, t.rows[1][axis] * step, t.rows[2][axis] * step};
 }
 
 Vec3 originOf(const ModelGrid& grid, const Transform& t) {
-    return transformed(t, {firstAlong(grid, 0), firstAlong(grid, 1), firstAlong(grid, 2)});
+    return transformed(t, {firstAlong(grid, t, 0), firstAlong(grid, t, 1), firstAlong(grid, t, 2)});
 }
 
 ResampleItem itemOf(const ModelGrid& grid, const Transform& t, uint32_t first_probe) {
@@ -284,10 +286,10 @@ Expected<ModelSlot> ModelSlots::slot(Model model) const {
     const Transform model_from_world = inverse(slot.transform);
     ModelSlot out{slot.first_probe, slot.grid.counts, {}};
     for (size_t i = 0; i < 3; ++i) {
-        const float step = spacing(slot.grid, i);
+        const float step = spacing(slot.grid, slot.transform, i);
         if (!(step > 0)) continue;  // a flat axis: all of it is probe 0
         for (size_t j = 0; j < 4; ++j) out.grid_from_world[i][j] = model_from_world.rows[i][j] / step;
-        out.grid_from_world[i][3] -= firstAlong(slot.grid, i) / step;
+        out.grid_from_world[i][3] -= firstAlong(slot.grid, slot.transform, i) / step;
         flattenUnlessFinite(out.grid_from_world[i]);
     }
     return out;

@@ -129,6 +129,7 @@ TEST(GridBake, LightStaysInItsRoom) {
                    static_cast<double>(4 - lamp_m.x), 100 * share);
             EXPECT_LE(share, 0.01);
         }
+    // Beside the wall: what leaks without tables from the other two comes and goes with the placement.
     const double unseen = leak(false, lamps_m[1], 1);
     printf("without visibility: %.2f %%\n", 100 * unseen);
     EXPECT_GE(unseen, 0.02);  // the test can tell

@@ -76,5 +76,28 @@ TEST(GridTruth, TwoRooms) {
     }
 }
 
+// As shipped: so small a level has more probes, and no luck with their places.
+TEST(GridTruth, TwoRoomsAsShipped) {
+    if (!std::filesystem::exists(truth_folder)) GTEST_SKIP() << "the reference irradiance is not here";
+    const auto scene = importLevel(levels_folder / "two_rooms.glb");
+    ASSERT_TRUE(scene) << scene.error().message;
+    SilentProgress progress;
+    CookStats stats;
+    auto profile = *loadProfile("desktop");
+    profile.global_grid = GridMode::On;
+    auto data = cookScene(*scene, profile, "draft", progress, stats);
+    ASSERT_TRUE(data) << data.error().message;
+    const auto pack = Pack::fromData(std::move(*data));
+    ASSERT_TRUE(pack) << pack.error().message;
+    const double floor_lux = truthFloor(readTruth("two_rooms.free.all_on"));
+    for (const auto& [name, state] :
+         {std::pair("all_on", ""), {"only_first", "all=0,desk=1"}, {"door_0", "door:mid=1"}}) {
+        const auto truth = readTruth(std::string("two_rooms.free.") + name);
+        const ErrorFigures f = gridErrorAgainst(*pack, state, truth, floor_lux);
+        EXPECT_LE(f.mean, 0.08) << name;  // the goals
+        EXPECT_LE(f.p95, 0.25) << name;
+    }
+}
+
 }  // namespace
 }  // namespace dimmer::cook::test

@@ -103,12 +103,38 @@ TEST(Sites, AFifthLieAtSurfacesEdgesAndCorners) {
             }
             ++at[surfaces];
         }
-        // Some of those for one surface happen to lie near another as well; grazing ways end a little further off.
+        // Some of those for one surface happen to lie near another as well; where ways graze, places stay away.
         for (const size_t surfaces : {1, 2, 3})
             EXPECT_NEAR(static_cast<double>(at[surfaces]), static_cast<double>(places.size()) / 3,
                         0.06 * static_cast<double>(places.size()))
                 << surfaces << " at " << angle;
     }
+}
+
+// Heights of places follow from the last digits of their numbers, what they are for must not.
+TEST(Sites, EveryStoreyHasSurfacesEdgesAndCorners) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    for (const float height_m : {-3.0f, 0.0f, 3.0f}) {
+        const size_t first = scene.meshes.size();
+        addBox(scene, {3, 1.3f, 3}, grey);
+        for (size_t m = first; m < scene.meshes.size(); ++m)
+            for (glm::vec3& p : scene.meshes[m].positions_m) p.y += height_m;
+    }
+    const auto choice = chooseSites(RayScene(scene), {.probes_max = 300, .sites = 16}, nullptr);
+    ASSERT_TRUE(choice);
+    std::array<std::array<double, 4>, 3> at{};  // per storey and number of surfaces
+    for (glm::vec3 p : choice->blocks[1].places_m) {
+        const auto storey = static_cast<size_t>(std::clamp(std::floor((p.y + 4.5f) / 3), 0.0f, 2.0f));
+        p.y -= 3 * (static_cast<float>(storey) - 1);
+        const glm::vec3 off_m = glm::vec3(3, 1.3f, 3) - glm::abs(p);
+        const int surfaces = (off_m.x < 0.0851f) + (off_m.y < 0.0851f) + (off_m.z < 0.0851f);
+        ++at[storey][static_cast<size_t>(surfaces)];
+    }
+    for (const auto& storey : at)
+        for (const size_t surfaces : {1, 2, 3})  // some two thousand places: thirds to within 3 %
+            EXPECT_NEAR(storey[surfaces], (storey[1] + storey[2] + storey[3]) / 3,
+                        0.2 * (storey[1] + storey[2] + storey[3]) / 3);
 }
 
 TEST(Sites, ProbesPerCubicMetreAreWhatIsAskedFor) {

@@ -82,6 +82,15 @@ TEST(Models, ProbesKeepOffTheFloorThatTheModelStandsOn) {
         const float expected = (1 + lit_as_at) * std::numbers::pi_v<float>;
         EXPECT_NEAR(sampler.sample(slot, {6, y, 6}, {0, 1, 0})[1], expected, 0.005f * expected) << y;  // as above
     }
+    // As far in the world where the model is drawn in centimetres.
+    Transform centimetres = at(6, 1, 6);
+    for (auto& row : centimetres.rows)
+        for (size_t axis = 0; axis < 3; ++axis) row[axis] *= 0.01f;
+    const Model large = *runtime.addModel({{-25, 0, -25}, {25, 180, 25}, {2, 2, 2}}, centimetres);
+    runtime.update();
+    const float sole = (1 + 1.05f) * std::numbers::pi_v<float>;
+    EXPECT_NEAR(GridSampler(pack, runtime.probes()).sample(*runtime.modelSlot(large), {6, 1, 6}, {0, 1, 0})[1], sole,
+                0.005f * sole);
     // Of a ball of 10 cm no more than a tenth of it.
     const Model ball = *runtime.addModel({{-0.05f, 0, -0.05f}, {0.05f, 0.1f, 0.05f}, {2, 2, 2}}, at(6, 1, 6));
     runtime.update();

@@ -225,7 +225,8 @@ dimmer_result dimmer_sample_lightmap(const dimmer_pack* pack, const uint32_t* ir
 
 /* ---- Light grids: things that move, and points in the air. ---- */
 
-/* A lattice of probes that fills a box in the model's space, its corners included; 1 to 64 probes along each axis. */
+/* A lattice of probes inside of a box in the model's space, 5 cm in the world off its faces (a tenth of its side at
+   most); 1 to 64 probes along each axis, a single one in the middle. */
 typedef struct dimmer_model_grid {
     float min_m[3], max_m[3];
     uint32_t counts[3];

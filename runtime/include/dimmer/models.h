@@ -12,7 +12,8 @@ struct Transform {
     std::array<std::array<float, 4>, 3> rows = {{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}}};
 };
 
-// Where a model's probes stand in its own space: a lattice that fills the box, its corners included.
+// Where a model's probes stand in its own space: a lattice inside of the box, 5 cm in the world off its faces (a tenth
+// of its side at most), so that what stands on a floor has none in the floor's plane; a single one in the middle.
 struct ModelGrid {
     std::array<float, 3> min_m = {-0.5f, -0.5f, -0.5f}, max_m = {0.5f, 0.5f, 0.5f};
     std::array<uint32_t, 3> counts = {2, 2, 2};  // 1..64 along each axis
