@@ -132,7 +132,7 @@ TEST(Sites, EveryStoreyHasSurfacesEdgesAndCorners) {
         ++at[storey][static_cast<size_t>(surfaces)];
     }
     for (const auto& storey : at)
-        for (const size_t surfaces : {1, 2, 3})  // some two thousand places: thirds to within 3 %
+        for (const size_t surfaces : {1, 2, 3})  // some hundred places of each: 8 % by chance
             EXPECT_NEAR(storey[surfaces], (storey[1] + storey[2] + storey[3]) / 3,
                         0.2 * (storey[1] + storey[2] + storey[3]) / 3);
 }
