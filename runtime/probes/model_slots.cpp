@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace dimmer {
 namespace {
@@ -12,9 +13,6 @@ namespace {
 using Vec3 = std::array<float, 3>;
 
 constexpr uint32_t item_probes_max = 64;
-// Tests of boxes above which every model is taken anew instead: a tenth of a millisecond.
-constexpr size_t box_tests_max = 1 << 16;
-
 constexpr float infinite = std::numeric_limits<float>::infinity();
 constexpr Box empty_box = {{infinite, infinite, infinite}, {-infinite, -infinite, -infinite}};
 
@@ -174,29 +172,6 @@ ModelSlot slotOf(const LocalGrid& grid) {
     return slot;
 }
 
-std::vector<Box> boxesOfClusters(const PackData& data) {
-    const GlobalGrid& global = data.probes.global;
-    std::vector<Box> of_probe(global.positions.size(), empty_box);
-    const auto at = [&](uint32_t probe) {
-        const ProbePosition& p = global.positions[probe];
-        return Vec3{p.x_m, p.y_m, p.z_m};
-    };
-    for (const Tetrahedron& t : global.tetrahedra)
-        for (const uint32_t corner : t.probes)
-            for (const uint32_t other : t.probes) extend(of_probe[corner], at(other));
-    std::vector<Box> boxes;
-    for (const Cluster& cluster : data.probes.clusters) {
-        Box& box = boxes.emplace_back(empty_box);
-        for (uint32_t i = cluster.first_receiver; i < cluster.first_receiver + cluster.receiver_count; ++i) {
-            const uint32_t number = data.probes.numbers[i];
-            if (number >= of_probe.size() || of_probe[number].min_m[0] > of_probe[number].max_m[0]) continue;
-            extend(box, of_probe[number].min_m);
-            extend(box, of_probe[number].max_m);
-        }
-    }
-    return boxes;
-}
-
 void countResampled(std::span<const ResampleItem> items, UpdateStats& stats) {
     uint64_t probes = 0;
     for (const ResampleItem& item : items) probes += item.count;
@@ -214,8 +189,7 @@ ModelSlots::ModelSlots(const PackData& data, uint32_t probes_max, uint32_t page_
       pool_(itemsMax(), itemsMax()),
       dirty_counts_(page_sets) {
     if (probes_max_ == 0) return;
-    cluster_boxes_ = boxesOfClusters(data);
-    changed_.reserve(cluster_boxes_.size());
+    cells_ = LitCells(data);
     slots_.reserve(itemsMax());
     free_slots_.reserve(itemsMax());
     items_.reserve(itemsMax());
@@ -313,17 +287,13 @@ void ModelSlots::mark(Slot& slot, uint32_t sets) {
 
 void ModelSlots::touch(uint32_t page_set, std::span<const WorkItem> items) {
     if (model_count_ == 0) return;
-    changed_.clear();
+    const uint32_t bit = 1u << page_set;
+    cells_.clear();
     uint32_t last = UINT32_MAX;
-    for (const WorkItem& item : items) {
-        if (item.cluster == last) continue;
-        last = item.cluster;
-        changed_.push_back(cluster_boxes_[item.cluster]);
-    }
-    const bool all = changed_.size() * model_count_ > box_tests_max;
+    for (const WorkItem& item : items)
+        if (item.cluster != std::exchange(last, item.cluster)) cells_.change(item.cluster);
     for (Slot& slot : slots_)
-        if (slot.used && (all || std::ranges::any_of(changed_, [&](const Box& box) { return box.meets(slot.box); })))
-            mark(slot, 1u << page_set);
+        if (slot.used && !(slot.dirty & bit) && cells_.changedIn(slot.box)) mark(slot, bit);
 }
 
 std::span<const ResampleItem> ModelSlots::take(uint32_t page_set) {

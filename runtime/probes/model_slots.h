@@ -4,6 +4,7 @@
 #include <dimmer/light_state.h>
 #include <dimmer/models.h>
 #include <pack/pack_data.h>
+#include <probes/lit_cells.h>
 #include <update/record_pool.h>
 
 #include <dimmer/work_list.glsl>
@@ -11,19 +12,6 @@
 #include <vector>
 
 namespace dimmer {
-
-struct Box {
-    std::array<float, 3> min_m, max_m;
-    bool meets(const Box& other) const {
-        for (size_t i = 0; i < 3; ++i)
-            if (!(min_m[i] <= other.max_m[i] && other.min_m[i] <= max_m[i])) return false;
-        return true;
-    }
-};
-
-// Per cluster of probes: the box of all tetrahedra that one of its probes is a corner of. A place outside is not lit by
-// them. Clusters without global probes have an empty box.
-std::vector<Box> boxesOfClusters(const PackData& data);
 
 // Where a grid's probes are. An axis along which it has one probe, or no length, is flat: all of it is that probe.
 ModelSlot slotOf(const LocalGrid& grid);
@@ -46,7 +34,7 @@ class ModelSlots {
     uint32_t probesMax() const { return probes_max_; }
     uint32_t itemsMax() const { return probes_max_ / probes_granule; }
 
-    // The light of these batches of probes has changed. Cost: their clusters times the models, within limits.
+    // The light of these batches of probes has changed. Cost: the cells of their clusters and of the models.
     void touch(uint32_t page_set, std::span<const WorkItem> items);
     bool dirty(uint32_t page_set) const { return dirty_counts_[page_set] > 0; }
     // Lists the probes to be taken anew and counts them as done. Valid until the next call.
@@ -84,7 +72,7 @@ class ModelSlots {
     std::vector<Slot> slots_;
     std::vector<uint32_t> free_slots_;
     std::vector<uint32_t> dirty_counts_;  // per set of pages
-    std::vector<Box> cluster_boxes_, changed_;
+    LitCells cells_;
     std::vector<ResampleItem> items_;
 };
 

@@ -137,6 +137,18 @@ TEST(Models, NothingMovedNothingIsTaken) {
     EXPECT_GT(lux(right, 11), dark_right);
 }
 
+// What one set lights at both ends of a level is one cluster, and nothing of what lies between.
+TEST(Models, BetweenTwoPlacesThatChangeNothingIsTaken) {
+    PackData data = gradientPack();
+    test::addLightOnProbes(data, 0, encodeE5B9G9R9(1, 1, 1), [](glm::vec3 p) { return p.x < 2 || p.x > 10; });
+    const Pack pack = packOf(std::move(data));
+    CpuRuntime runtime(pack, 1, 64);
+    for (const float x : {1.0f, 5.5f, 11.0f}) ASSERT_TRUE(runtime.addModel({}, at(x, 2, 6)));
+    runtime.update();
+    ASSERT_TRUE(runtime.apply("set0=0"));
+    EXPECT_EQ(runtime.update().probes_resampled, 16u);
+}
+
 TEST(Models, HandlesAndRangesAreTheirOwn) {
     const Pack pack = packOf(gradientPack());
     CpuRuntime runtime(pack, 1, 4096);
