@@ -69,7 +69,11 @@ Expected<StateAssignment> parseAssignment(std::string_view item) {
                            *weight};
 }
 
-// Levenshtein's distance, one row at a time.
+char lowerCase(char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
+// Levenshtein's distance, one row at a time; capitals are no difference.
 size_t editDistance(std::string_view a, std::string_view b) {
     std::vector<size_t> row(b.size() + 1);
     for (size_t j = 0; j < row.size(); ++j) row[j] = j;
@@ -77,7 +81,7 @@ size_t editDistance(std::string_view a, std::string_view b) {
         size_t diagonal = row[0];
         row[0] = i + 1;
         for (size_t j = 0; j < b.size(); ++j) {
-            const size_t substituted = diagonal + (a[i] == b[j] ? 0 : 1);
+            const size_t substituted = diagonal + (lowerCase(a[i]) == lowerCase(b[j]) ? 0 : 1);
             diagonal = row[j + 1];
             row[j + 1] = std::min({substituted, row[j] + 1, row[j + 1] + 1});
         }

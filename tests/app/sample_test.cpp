@@ -130,6 +130,7 @@ TEST_F(Sample, MalformedPointsAreNamedByLine) {
 TEST_F(Sample, BadStates) {
     const std::vector<std::pair<std::string, std::string>> cases = {
         {"on=1", "Did you mean \"one\""},
+        {"ONE=1", "Did you mean \"one\""},
         {"one", "NAME=VALUE"},
         {"one=", "neither a number"},
         {"one=1/2", "neither"},
