@@ -263,8 +263,8 @@ void addCookCommand(CLI::App& app, int& exit_code) {
                     "the table says what was changed and the mean error that it adds");
     c->add_option(
          "--fit-max-error", a->options.fit_error_max,
-         "exit with 3 instead where --fit would add a larger mean error at surfaces as predicted, e.g. 0.05 for "
-         "5 %; what fewer probes cost is not predicted")
+         "exit with 3 instead where --fit would add a larger mean error as predicted, at surfaces or to the light of "
+         "models, e.g. 0.05 for 5 %")
         ->needs(fit)
         ->check(refuseNotFinite)
         ->check(CLI::NonNegativeNumber);

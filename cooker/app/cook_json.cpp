@@ -35,7 +35,8 @@ Json remedyJson(const Remedy& remedy) {
             {"energy", fourDigits(remedy.energy)},
             {"energy_of", remedy.energy > 0 ? Json(remedy.energy_of) : Json(nullptr)},
             {"error", remedy.texels ? Json(fourDigits(remedy.error)) : Json(nullptr)},
-            {"moves_light", remedy.moves_light}};
+            {"moves_light", remedy.moves_light},
+            {"grid_error", remedy.grid_error ? Json(fourDigits(*remedy.grid_error)) : Json(nullptr)}};
 }
 
 Json remediesJson(const std::vector<Remedy>& remedies) {

@@ -78,10 +78,18 @@ struct TermReport {
     double energy_dropped = 0;  // share of it where neither the term is active nor one that takes it along, 0..1
 };
 
+// How far light in the open is off with so many probes: see gridError(), its mean over places all over the level.
+struct ProbesError {
+    uint32_t probes = 0;
+    float error = 0;
+};
+
 struct BakedGrid {
     GlobalGrid grid;               // empty: there is none
     Sparse<ProbeTermLight> light;  // per position of the grid: always-on light first, then the active terms
     double free_volume_m3 = 0;     // of the level: what lies in the open
+    // As measured while it grew, to its last probe and the error with all of them; empty where it did not grow.
+    std::vector<ProbesError> errors;
 };
 
 // Two doors whose light depends on how both stand, while no combination covers them.

@@ -237,6 +237,7 @@ std::vector<std::byte> toBytes(const BakedGrid& baked) {
     visitGrid(baked.grid, [&](const auto& values) { putAll(out, values); });
     out.put(baked.grid.start);
     out.put(baked.free_volume_m3);
+    putAll(out, baked.errors);
     putRows(out, baked.light);
     return out.take();
 }
@@ -247,6 +248,7 @@ std::optional<BakedGrid> gridFromBytes(std::span<const std::byte> bytes) {
     visitGrid(baked.grid, [&](auto& values) { getAll(in, values); });
     baked.grid.start = in.get<StartGrid>();
     baked.free_volume_m3 = in.get<double>();
+    getAll(in, baked.errors);
     auto light = getRows<ProbeTermLight>(in);
     if (!light || !in.atEnd()) return {};
     baked.light = std::move(*light);

@@ -36,11 +36,14 @@ std::string lastWays(const PackCost& cost, const Profile& profile, bool fit_woul
     return text;
 }
 
-// As predicted; what fewer probes cost is not.
-double errorOf(const std::vector<Remedy>& fitted) {
-    double error = 0;
-    for (const Remedy& remedy : fitted) error += remedy.error;
-    return error;
+// As predicted: of surfaces, or of what moves, where that is more.
+double errorOf(const std::vector<Remedy>& fitted, const Remedy& next) {
+    double surfaces = next.error, models = next.grid_error.value_or(0);
+    for (const Remedy& remedy : fitted) {
+        surfaces += remedy.error;
+        models += remedy.grid_error.value_or(0);
+    }
+    return std::max(surfaces, models);
 }
 
 std::string tooLossy(double error, float error_max) {
@@ -96,7 +99,7 @@ Expected<PackData> cookWithin(const Scene& scene, const CookOptions& options, Pr
             std::ranges::count_if(result.fitted, [](const Remedy& r) { return r.changes.front().key == density_key; });
         Remedy remedy = fittingRemedy(*pack, cost, result.profile, losses, static_cast<size_t>(density_steps));
         if (remedy.changes.empty()) return overBudget("; all that --fit changes would not be enough");
-        if (const double error = errorOf(result.fitted) + remedy.error;
+        if (const double error = errorOf(result.fitted, remedy);
             options.fit_error_max && error > static_cast<double>(*options.fit_error_max))
             return overBudget(tooLossy(error, *options.fit_error_max));
         if (auto ok = applyRemedy(remedy, result.profile); !ok) return std::unexpected(ok.error());

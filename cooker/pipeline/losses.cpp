@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 
 namespace dimmer::cook {
 namespace {
@@ -92,7 +93,8 @@ LossTable::LossTable(const Baked& baked, const Texels& texels, std::span<const f
       overlap_max_(overlap_max == 0 ? UINT32_MAX : overlap_max),
       copies_(copiesOf(texels)),
       shown_(listTexels(texels)),
-      sizes_(std::move(sizes)) {
+      sizes_(std::move(sizes)),
+      probes_errors_(baked.grid.errors) {
     for (const Term& term : terms_) {
         group_count_ = std::max(group_count_, term.group + 1);
         for (const auto* list : {&term.doors_open, &term.doors_closed})
@@ -224,6 +226,26 @@ RecordBytes LossTable::bytes(const Rungs& rungs) const {
             for (const uint32_t door : *list) sum.by_door[door] += bytes;
     });
     return sum;
+}
+
+// Between the numbers that were measured, along a power of the number; with fewer than any, along the cube root that
+// places twice as far apart would have.
+std::optional<double> LossTable::probesError(double left) const {
+    const std::vector<ProbesError>& e = probes_errors_;
+    if (e.empty()) return {};
+    const auto errorAt = [&](size_t i) { return static_cast<double>(e[i].error); };
+    const double probes = left * e.back().probes;
+    const auto above = std::ranges::find_if(e, [&](const ProbesError& at) { return at.probes >= probes; });
+    const auto i = static_cast<size_t>(above - e.begin());
+    double error = errorAt(std::min(i, e.size() - 1));
+    if (i == 0) {
+        error *= std::cbrt(e[0].probes / std::max(probes, 1.0));
+    } else if (i < e.size() && errorAt(i) > 0 && errorAt(i - 1) > 0) {
+        const double along =
+            std::log(probes / e[i - 1].probes) / std::log(static_cast<double>(e[i].probes) / e[i - 1].probes);
+        error = errorAt(i - 1) * std::pow(errorAt(i) / errorAt(i - 1), along);
+    }
+    return std::max(0.0, error - errorAt(e.size() - 1));
 }
 
 uint64_t LossTable::storedBytes(const Rungs& rungs) const {

@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -96,6 +97,10 @@ class LossTable {
     };
     TexelsLeft texelsLeft(double factor) const;
 
+    // By how much the light in the open would be further off, in the mean, with this share of the global grid's probes;
+    // none where that is not known. See ProbesError.
+    std::optional<double> probesError(double left) const;
+
     uint32_t groupCount() const { return group_count_; }
 
    private:
@@ -122,6 +127,7 @@ class LossTable {
     std::vector<ShownTexel> shown_;
     ChartSizes sizes_;
     CoarserTexels coarser_;
+    std::vector<ProbesError> probes_errors_;
 };
 
 }  // namespace dimmer::cook

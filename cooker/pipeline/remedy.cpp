@@ -31,7 +31,8 @@ bool dominates(const Remedy& a, const Remedy& b) {
         return std::ranges::find(b.changes, c.key, &Change::key) != b.changes.end();
     };
     return a.changes.size() < b.changes.size() && std::ranges::all_of(a.changes, in_b) && a.fits >= b.fits &&
-           a.saves >= b.saves && a.error <= b.error && a.energy <= b.energy && a.moves_light <= b.moves_light;
+           a.saves >= b.saves && a.error <= b.error && a.grid_error <= b.grid_error && a.energy <= b.energy &&
+           a.moves_light <= b.moves_light;
 }
 
 // Thresholds of single sets are of the same kind as that of all.
@@ -70,6 +71,11 @@ std::string Remedy::options() const {
     return fmt::format("{}", fmt::join(parts, " "));
 }
 
+std::string Remedy::modelsText() const {
+    return grid_error ? fmt::format(", adds {:.2f} % to the light of models", 100 * *grid_error)
+                      : ", coarsens the light of models by what is not predicted";
+}
+
 std::string Remedy::text(std::string_view note) const {
     std::vector<std::string> parts;
     for (const Change& c : changes)
@@ -79,8 +85,7 @@ std::string Remedy::text(std::string_view note) const {
                        all ? "" : fmt::format(" and {} more", changes.size() - parts.size()), humanBytes(saves),
                        texels ? fmt::format(", adds a mean error of {:.2f} %", 100 * error) : "",
                        energy > 0 ? fmt::format(", drops {:.2f} % of the light of {}", 100 * energy, energy_of) : "",
-                       moves_light ? ", coarsens the light of models by what is not predicted" : "", note,
-                       all ? "" : "\n    in full: " + options());
+                       moves_light ? modelsText() : "", note, all ? "" : "\n    in full: " + options());
 }
 
 }  // namespace dimmer::cook

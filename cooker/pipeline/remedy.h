@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -18,17 +19,21 @@ struct Change {
 struct Remedy {
     std::vector<Change> changes;
     bool fits = false;
-    uint64_t saves = 0;          // bytes of device memory
-    double error = 0;            // mean relative error that it adds, all sets at weight 1; see LossTable
-    double energy = 0;           // of what loses most, the share of its stored light, by luminous flux at texels
-    std::string energy_of = {};  // a set, or always-on light through doors
-    bool moves_light = false;    // the light of what moves gets coarser; by how much is not predicted
-    bool texels = true;          // that of lightmaps changes, by `error`
+    uint64_t saves = 0;  // bytes of records, pages and grids on the device; not the work lists that go with them
+    double error = 0;    // mean relative error that it adds, all sets at weight 1; see LossTable
+    double energy = 0;   // of what loses most, the share of its stored light, by luminous flux at texels
+    std::string energy_of = {};             // a set, or always-on light through doors
+    bool moves_light = false;               // the light of what moves gets coarser
+    std::optional<double> grid_error = {};  // by so much in the mean, where that is known; see LossTable::probesError
+    bool texels = true;                     // that of lightmaps changes, by `error`
 
     // For people, with the note behind it. Of many changes the first few, and all of them as options on a line below.
     std::string text(std::string_view note = {}) const;
     // "--set a=1 --set b=2", as a shell reads it.
     std::string options() const;
+
+   private:
+    std::string modelsText() const;
 };
 
 // Without those beside which another changes less and is no worse in anything that is said of it.

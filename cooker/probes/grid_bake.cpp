@@ -208,6 +208,7 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
         });
     }
     out.grid = std::move(placed->grid);
+    out.errors = std::move(placed->errors);
     const std::vector<uint32_t> placed_as = orderByFaces(out.grid);
     out.light = Sparse<ProbeTermLight>::build(placed_as.size(), [&](size_t begin, size_t end, auto emit) {
         for (size_t i = begin; i < end; ++i) emit(std::span<const ProbeTermLight>(rows[placed_as[i]]));

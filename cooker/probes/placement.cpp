@@ -54,11 +54,14 @@ class Placer {
         if (auto ok = settings_.uniform ? build() : buildToGrow(); !ok) return std::unexpected(ok.error());
         if (!settings_.uniform) {
             progress_.stage("probe placement", exchangeRounds() + 2);
-            if (auto ok = grow(); !ok) return std::unexpected(ok.error());
+            if (auto ok = growFirst(); !ok) return std::unexpected(ok.error());
             if (auto ok = exchange(); !ok) return std::unexpected(ok.error());
             if (auto ok = moveAbout(); !ok) return std::unexpected(ok.error());
         }
-        return trial_.take();
+        const std::vector<ProbesError> errors = errorsOfFewer();
+        Placement placement = trial_.take();
+        placement.errors = errors;
+        return placement;
     }
 
    private:
@@ -69,14 +72,43 @@ class Placer {
         return trial_.build(probes_, std::min(std::max(places, places_min), trial_.placeCount()));
     }
 
-    // Adds probes until they are as many as may be, or nothing is wrong.
+    Expected<void> growFirst() {
+        note();
+        const auto grown = grow([this] { note(); });
+        note();
+        return grown;
+    }
+    void note() { errors_.push_back({static_cast<uint32_t>(probes_.places.size()), toFloat(trial_.meanError())}); }
+
+    // Fewer probes would be exchanged and moved as well: what that made of all of them it is taken to make of fewer.
+    std::vector<ProbesError> errorsOfFewer() const {
+        std::vector<ProbesError> errors;
+        if (errors_.empty() || !(errors_.back().error > 0)) return errors;
+        const float mended = toFloat(trial_.meanError()) / errors_.back().error;
+        for (ProbesError e : errors_) {
+            e.error *= mended;
+            if (errors.empty() || e.probes > errors.back().probes)
+                errors.push_back(e);
+            else
+                errors.back() = e;  // the last word, from more places
+        }
+        return errors;
+    }
+    static float toFloat(double v) { return static_cast<float>(v); }
+
     Expected<void> grow() {
+        return grow([] {});
+    }
+    // Adds probes until they are as many as may be, or nothing is wrong.
+    template <class Noted>
+    Expected<void> grow(Noted&& noted) {
         bool at_all = false;  // once few places show nothing wrong
         for (uint32_t round = 0; round < grow_rounds_max && probes_.places.size() < limit_; ++round) {
             const bool grown = refine();
             if (!grown && trial_.looksAtAll()) break;
             at_all = at_all || !grown;
             if (auto ok = at_all ? build() : buildToGrow(); !ok) return ok;
+            noted();
         }
         progress_.advance(1);
         return trial_.looksAtAll() ? Expected<void>{} : build();
@@ -299,7 +331,8 @@ class Placer {
     const std::vector<glm::vec3>& places_;
     uint32_t level_ = 0;
     ChosenProbes probes_;
-    Neighbourhood near_;  // of probes_
+    Neighbourhood near_;               // of probes_
+    std::vector<ProbesError> errors_;  // as it grew
 };
 
 }  // namespace

@@ -15,6 +15,7 @@ struct Placement {
     std::vector<uint8_t> guessed;  // per position: whether it is such a corner
     // The places where light was traced, probes included, without corners.
     std::vector<FitSite> sites;
+    std::vector<ProbesError> errors;  // of fewer probes, to all that there are
 };
 
 // Of `states`, the light at the places of `choice`. A few places, far apart, become probes; then, round after round,

@@ -15,10 +15,11 @@ PackData withGlobalProbes(size_t probes) {
     return pack;
 }
 
-// One chart of 40 x 40 texels.
-LossTable oneChart(bool fixed) {
-    return LossTable(Baked{}, Texels{}, {}, 0,
-                     {.page_size = 64, .charts = {{40, 40}}, .fixed = {fixed}, .of_face = {}});
+// One chart of 40 x 40 texels, and what fewer probes lose.
+LossTable oneChart(bool fixed, std::vector<ProbesError> errors = {}) {
+    Baked baked;
+    baked.grid.errors = std::move(errors);
+    return LossTable(baked, Texels{}, {}, 0, {.page_size = 64, .charts = {{40, 40}}, .fixed = {fixed}, .of_face = {}});
 }
 
 // 128 kB of 50, of which a grid of 28 kB can save only a part.
@@ -123,6 +124,55 @@ TEST(FitLimits, RecordsOfProbesGoWithThem) {
     // Texels' records are no probes', with light or without.
     cost.probe_records = 0;
     EXPECT_TRUE(fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true)).changes.empty());
+}
+
+// Nothing but probes has records: a budget of records asks for fewer of them.
+TEST(FitLimits, RecordsOfProbesHaveABudgetToo) {
+    PackCost cost;
+    cost.base_lightmap = 20000;
+    cost.global_grid = 80000;
+    cost.dynamic = cost.probe_records = 100000;
+    Profile profile;
+    profile.budget_dynamic = 60000;
+    const Remedy remedy = fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(true));
+    ASSERT_EQ(remedy.changes.size(), 1u);
+    EXPECT_EQ(remedy.changes[0].key, "grids.probes_max");
+    EXPECT_NEAR(remedy.changes[0].to, 0.97 * 500 - 8, 1);  // the first share that does, of 3/4, 1/2, 3/8 ...
+    EXPECT_TRUE(remedy.fits);
+    const auto named = remedies(withGlobalProbes(1000), cost, profile, oneChart(true));
+    ASSERT_FALSE(named.empty());
+    EXPECT_EQ(named[0].changes, remedy.changes);
+}
+
+// Pages and the grid are too much in all. Where fewer probes lose nothing they go, as many as pages need not; where
+// they lose more than pages do (which are all alike here, and lose nothing), none.
+TEST(FitLimits, AsManyProbesGoAsLoseLeast) {
+    PackCost cost;
+    cost.base_lightmap = cost.global_grid = 50000;
+    Profile profile;
+    profile.budget_total = 70000;
+    const Remedy dear =
+        fittingRemedy(withGlobalProbes(1000), cost, profile, oneChart(false, {{100, 0.3f}, {1000, 0.1f}}));
+    ASSERT_EQ(dear.changes.size(), 1u);
+    EXPECT_EQ(dear.changes[0].key, density_key);
+    // The same where pages cannot shrink: the first share that is enough, 3/8 of 50 kB with 50 of pages.
+    const LossTable fixed = oneChart(true, {{100, 0.3f}, {1000, 0.1f}});
+    const Remedy only = fittingRemedy(withGlobalProbes(1000), cost, profile, fixed);
+    ASSERT_EQ(only.changes.size(), 1u);
+    EXPECT_EQ(only.changes[0].key, "grids.probes_max");
+    // 0.97 * 375 of 1000 probes, along the power that leads from 0.3 at 100 to 0.1 at 1000.
+    ASSERT_TRUE(only.grid_error);
+    EXPECT_NEAR(*only.grid_error, 0.1 * (std::pow(1000.0 / 363, std::log10(3.0)) - 1), 1e-6);
+    EXPECT_THAT(only.text(), HasSubstr("adds 6.22 % to the light of models"));
+}
+
+TEST(FitLimits, WhatFewerProbesLoseIsReadOffWhatWasMeasured) {
+    EXPECT_FALSE(oneChart(true).probesError(0.5));
+    const LossTable table = oneChart(true, {{10, 0.4f}, {40, 0.2f}, {160, 0.1f}});
+    EXPECT_EQ(table.probesError(1), 0.0);
+    EXPECT_NEAR(*table.probesError(0.25), 0.1, 1e-7);                        // 40 probes
+    EXPECT_NEAR(*table.probesError(0.125), 0.4 / std::sqrt(2) - 0.1, 1e-7);  // 20, between 10 and 40: as 1 / sqrt(n)
+    EXPECT_NEAR(*table.probesError(10.0 / 160 / 8), 0.7, 1e-6);  // an eighth of the fewest: twice as far apart
 }
 
 // No grid of a model has less than 8 probes: one round finds that out, and its figures are not those of the settings
