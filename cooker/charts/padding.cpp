@@ -121,6 +121,9 @@ class Padding {
             positionAt(own.face, glm::vec2(TexelAddress::x(fill.address) + 0.5f, TexelAddress::y(fill.address) + 0.5f));
         const auto hit = rays_.nearest(centre + normal * off_plane_m, -normal, 2 * off_plane_m, 0);
         if (!hit || hit->back != unwrap_.faces[own.face].back) return no_index;
+        // A leaf flush with its wall is gone when the door opens, and its light with it.
+        const auto conditionOf = [&](uint32_t triangle) { return rays_.triangles()[triangle].condition; };
+        if (conditionOf(hit->triangle) != conditionOf(unwrap_.faces[own.face].triangle)) return no_index;
         const uint32_t face = unwrap_.faceOf(hit->triangle, hit->back);
         if (face == no_index || unwrap_.face_chart[face] == chart || !wanted(face)) return no_index;
         const uint32_t found = receiverOf(unwrap_, texels_, *hit);

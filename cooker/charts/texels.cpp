@@ -223,7 +223,7 @@ class TexelSampler {
         uint32_t backs = 0, told = 0;
         const auto look = [&](glm::vec3 direction) {
             const auto hit = nearest(direction);
-            const bool back = hit && hit->back && !doubleSided(hit->triangle);
+            const bool back = hit && hit->back && !isSkin(hit->triangle);
             backs += back;
             told += back || !hit || !rays_.liesOnBack(*hit, at.position_m, direction, surfaces);
         };
@@ -250,14 +250,16 @@ class TexelSampler {
         uint32_t open = 0;
         for (uint32_t i = 0; i < horizon_rays && open < horizon_open_min; ++i) {
             const auto hit = nearest(alongSurface(f, i));
-            const bool stopped_by_back = hit && hit->back && !doubleSided(hit->triangle);
+            const bool stopped_by_back = hit && hit->back && !isSkin(hit->triangle);
             open += !stopped_by_back && !(hit && hit->distance_m < horizon_open_m);
         }
         return open >= horizon_open_min;
     }
 
-    bool doubleSided(uint32_t triangle) const {
-        return rays_.scene().materials[rays_.triangles()[triangle].material].double_sided;
+    // Nothing is inside behind its back: it has none, or lets light by.
+    bool isSkin(uint32_t triangle) const {
+        const Material& material = rays_.scene().materials[rays_.triangles()[triangle].material];
+        return material.double_sided || material.alpha_mode != AlphaMode::Opaque;
     }
 
     // Part of the texel lies inside a wall: of the parts on its two sides, the one with more points stays.

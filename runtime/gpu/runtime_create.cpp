@@ -29,10 +29,11 @@ Expected<void> checkDevice(const VulkanContext& vulkan) {
             fmt::format("physical_device is a device of Vulkan {}.{}, and the runtime needs 1.2. "
                         "Choose another one, or update its driver.",
                         VK_API_VERSION_MAJOR(properties.apiVersion), VK_API_VERSION_MINOR(properties.apiVersion)));
-    if (allocationBytesMax(vulkan.physical_device) == 0)
+    // The loader has such functions for an instance of any version, the device only for one of 1.2.
+    if (!vkGetDeviceProcAddr(vulkan.device, "vkWaitSemaphores"))
         return fail(ErrorCode::Unsupported,
-                    "The instance is one of Vulkan 1.0, and the runtime needs 1.2. Create the instance for Vulkan 1.2 "
-                    "(VkApplicationInfo::apiVersion).");
+                    "The instance is one of Vulkan 1.0 or 1.1, and the runtime needs 1.2. Create the instance for "
+                    "Vulkan 1.2 (VkApplicationInfo::apiVersion).");
     const auto families = queueFamilies(vulkan.physical_device);
     DIMMER_TRY(checkQueueFamily("queue_family", vulkan.queue_family, families));
     if (!vulkan.compute_queue) return {};

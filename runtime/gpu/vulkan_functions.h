@@ -61,6 +61,7 @@
     X(vkEnumeratePhysicalDevices)               \
     X(vkFreeMemory)                             \
     X(vkGetBufferMemoryRequirements)            \
+    X(vkGetDeviceProcAddr)                      \
     X(vkGetDeviceQueue)                         \
     X(vkGetFenceStatus)                         \
     X(vkGetImageMemoryRequirements)             \

@@ -99,6 +99,19 @@ TEST(Padding, GoesOnAcrossASeam) {
     }
 }
 
+// A trapdoor's leaf, flush with the floor around it: open, its light is gone, and is no part of the floor's.
+TEST(Padding, OfAFlushLeafIsTheFloorsOwn) {
+    Scene scene = twoFloors();
+    scene.doors.push_back({.name = "trap"});
+    scene.meshes[1].door = 0;
+    const PaddedFloors floors(std::move(scene));
+    for (const uint32_t floor : {0u, 1u}) {
+        const auto ring = floors.ringOf(floor);
+        EXPECT_EQ(ring.size(), ring_texels);
+        for (const FillTexel& fill : ring) expectCopiesItsNeighbour(floors, floor, fill);
+    }
+}
+
 TEST(Padding, DoesNotReachThroughAWall) {
     Scene scene = twoFloors();
     Material sheet = lambert(0.5f);

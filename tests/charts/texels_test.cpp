@@ -134,6 +134,31 @@ void turn(Scene& scene, float angle) {
 
 // Stairs of boxes, each as high as its step and touching the next: all around a point in one of them lies the back of
 // it and, in the same place, the front of another. Risers were black where a texel holds more of the hidden part.
+// A decal's back is all that a floor 1 cm below it sees: where it lets light by the floor is lit, and none of its
+// points are inside of anything. (Of an opaque one, a lid without sides, it is not.)
+TEST(Texels, BelowADecalAreLit) {
+    for (const AlphaMode mode : {AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask}) {
+        Scene scene;
+        addFloor(scene, 1, addMaterial(scene, lambert(0.5f)));
+        Material sheet = lambert(0.5f);
+        sheet.alpha_mode = mode;
+        sheet.alpha = 0.5f;
+        addQuad(scene, "decal", {0, 0.01f, 0}, {0, 0, 1}, {1, 0, 0}, addMaterial(scene, std::move(sheet)));
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 64});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 8);
+        size_t below = 0;
+        for (size_t i = 0; i < texels.size(); ++i)
+            for (uint32_t s = 0; s < texels.sampleCount(i); ++s)
+                below += samplePoint(rays, *charts, texels, i, s).position_m.y < 0.005f;
+        if (mode == AlphaMode::Opaque)
+            EXPECT_LT(below, 64u);
+        else
+            EXPECT_EQ(below, 8u * 64);
+    }
+}
+
 TEST(Texels, OfStepsThatTouchSeeTheRoom) {
     for (const float angle : {0.0f, 0.12f})
         for (const float texels_per_metre : {2.0f, 4.0f}) {

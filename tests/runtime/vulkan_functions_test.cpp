@@ -103,31 +103,53 @@ TEST_F(VulkanFunctionsGpu, OneThatIsMissingIsNamed) {
     EXPECT_THAT(refused.error().message, HasSubstr("vkWaitSemaphores"));
 }
 
-TEST_F(VulkanFunctionsGpu, AnInstanceForVulkanOneIsTold) {
-    VkApplicationInfo application{};
-    application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
-    application.apiVersion = VK_API_VERSION_1_0;
-    VkInstanceCreateInfo info{};
-    info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
-    info.pApplicationInfo = &application;
+// With a device of its own, which has no function of Vulkan 1.2 whatever the loader says.
+TEST_F(VulkanFunctionsGpu, AnInstanceOfAnEarlierVersionIsTold) {
     const auto function = [](VkInstance of, auto& pointer, const char* name) {
         pointer = reinterpret_cast<std::remove_reference_t<decltype(pointer)>>(vkGetInstanceProcAddr(of, name));
     };
     PFN_vkCreateInstance create = nullptr;
-    PFN_vkEnumeratePhysicalDevices enumerate = nullptr;
-    PFN_vkDestroyInstance destroy = nullptr;
     function(VK_NULL_HANDLE, create, "vkCreateInstance");
-    VulkanContext vulkan = device().context();
-    ASSERT_EQ(create(&info, nullptr, &vulkan.instance), VK_SUCCESS);
-    function(vulkan.instance, enumerate, "vkEnumeratePhysicalDevices");
-    function(vulkan.instance, destroy, "vkDestroyInstance");
-    uint32_t count = 1;
-    ASSERT_GE(enumerate(vulkan.instance, &count, &vulkan.physical_device), VK_SUCCESS);
-    const auto refused = Runtime::create(vulkan, test::packOf(test::randomPack(1)));
-    destroy(vulkan.instance, nullptr);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
-    EXPECT_THAT(refused.error().message, HasSubstr("VkApplicationInfo::apiVersion"));
+    for (const uint32_t version : {VK_API_VERSION_1_0, VK_API_VERSION_1_1}) {
+        VkApplicationInfo application{};
+        application.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO;
+        application.apiVersion = version;
+        VkInstanceCreateInfo info{};
+        info.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO;
+        info.pApplicationInfo = &application;
+        VulkanContext vulkan = device().context();
+        ASSERT_EQ(create(&info, nullptr, &vulkan.instance), VK_SUCCESS);
+        PFN_vkEnumeratePhysicalDevices enumerate = nullptr;
+        PFN_vkCreateDevice create_device = nullptr;
+        PFN_vkDestroyDevice destroy_device = nullptr;
+        PFN_vkGetDeviceQueue queue_of = nullptr;
+        PFN_vkDestroyInstance destroy = nullptr;
+        function(vulkan.instance, enumerate, "vkEnumeratePhysicalDevices");
+        function(vulkan.instance, create_device, "vkCreateDevice");
+        function(vulkan.instance, destroy_device, "vkDestroyDevice");
+        function(vulkan.instance, queue_of, "vkGetDeviceQueue");
+        function(vulkan.instance, destroy, "vkDestroyInstance");
+        uint32_t count = 1;
+        ASSERT_GE(enumerate(vulkan.instance, &count, &vulkan.physical_device), VK_SUCCESS);
+        const float priority = 1;
+        VkDeviceQueueCreateInfo queue{};
+        queue.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO;
+        queue.queueFamilyIndex = vulkan.queue_family;
+        queue.queueCount = 1;
+        queue.pQueuePriorities = &priority;
+        VkDeviceCreateInfo device_info{};
+        device_info.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO;
+        device_info.queueCreateInfoCount = 1;
+        device_info.pQueueCreateInfos = &queue;
+        ASSERT_EQ(create_device(vulkan.physical_device, &device_info, nullptr, &vulkan.device), VK_SUCCESS);
+        queue_of(vulkan.device, vulkan.queue_family, 0, &vulkan.queue);
+        const auto refused = Runtime::create(vulkan, test::packOf(test::randomPack(1)));
+        destroy_device(vulkan.device, nullptr);
+        destroy(vulkan.instance, nullptr);
+        ASSERT_FALSE(refused);
+        EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
+        EXPECT_THAT(refused.error().message, HasSubstr("VkApplicationInfo::apiVersion"));
+    }
 }
 
 }  // namespace
