@@ -220,8 +220,8 @@ void addExplainCommand(CLI::App& app, int& exit_code) {
                   "surface or grid, whatever is near; default: a surface within 10 cm, else the grid")
         ->check(CLI::IsMember({"surface", "grid"}));
     c->add_option("--state", a->state,
-                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (or their "
-                  "maximum), doors 0");
+                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (their "
+                  "maximum where that is less), doors 0");
     c->add_option("--json", a->json, "write the same as JSON; - for stdout, in the table's place");
     c->footer(
         "Irradiance in lux of every contribution at its weight, its share of the luminance, the bytes of its record "

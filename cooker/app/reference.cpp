@@ -68,8 +68,8 @@ void addReferenceCommand(CLI::App& app, int& exit_code) {
     c->add_option("--points", a->points, "CSV with the header x,y,z,nx,ny,nz (metres, glTF axes); - for stdin")
         ->required();
     c->add_option("--state", a->state,
-                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (or their "
-                  "maximum), doors 0; a door "
+                  "weights, e.g. \"hall=0.5,alarm=1/0.2/0.2,door:front=1\"; what is not named: sets 1 (their "
+                  "maximum where that is less), doors 0; a door "
                   "is 0 or 1");
     c->add_option("--paths", a->paths, "paths per point; the standard error falls with their square root")
         ->check(CLI::Range(2u, 1u << 24))

@@ -43,6 +43,9 @@ Expected<void> addCook(const std::string& file, const std::string& pack, ReportI
     if (!json) return std::unexpected(json.error());
     if (auto ok = checkPackOf(*json, file, "cook --json", pack); !ok) return ok;
     try {
+        if (json->value("result", "cooked") != "cooked")
+            return fail(ErrorCode::BadInput,
+                        fmt::format("{}: it is of a cook that ended over its budgets, from which no pack came", file));
         input.seconds = json->at("seconds").get<std::map<std::string, double>>();
         if (const auto of_bake = json->find("bake_seconds"); of_bake != json->end())
             for (const auto& [stage, seconds] : of_bake->items())
@@ -88,7 +91,13 @@ Expected<void> addHeatMaps(const std::string& folder, const std::string& pack, R
     if (folder.empty() || !std::filesystem::exists(index, ignored)) return {};
     const auto json = readJson(index.string());
     if (!json) return std::unexpected(json.error());
-    return checkPackOf(*json, index.string(), "verify --heatmap", pack);
+    if (auto ok = checkPackOf(*json, index.string(), "verify --heatmap", pack); !ok) return ok;
+    if (input.verify.is_object() && json->contains("state") && json->at("state") != input.verify.at("state"))
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: its pictures are of the state {}, the figures of --verify of {}; run `dimmer "
+                                "verify` with both --json and --heatmap",
+                                index.string(), json->at("state").dump(), input.verify.at("state").dump()));
+    return {};
 }
 
 int run(const ReportArguments& a) {

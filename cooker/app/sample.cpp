@@ -71,7 +71,8 @@ void addSampleCommand(CLI::App& app, int& exit_code) {
         ->required();
     c->add_option("--state", a->state,
                   "weights: a light set's name = scalar or r/g/b (1: as baked), door:NAME = 0 closed .. 1 open; e.g. "
-                  "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1 (or their maximum), doors 0. "
+                  "\"hall=0.5,alarm=1/0.2/0.2,door:front=1\". What is not named: sets 1 (their maximum where that is "
+                  "less), doors 0. "
                   "all=0 turns every set "
                   "off first");
     c->add_option("--from", a->from,

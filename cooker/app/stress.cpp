@@ -34,7 +34,8 @@ void printReport(const StressReport& r, const std::string& device) {
 nlohmann::ordered_json toJson(const StressReport& r, const StressArguments& a, const std::string& device) {
     nlohmann::ordered_json j = {{"pack", a.pack},       {"seed", a.options.seed}, {"device", device},
                                 {"frames", r.frames},   {"events", r.events},     {"checks", r.checks},
-                                {"seconds", r.seconds}, {"exact", r.exact()},     {"memory_flat", r.memoryFlat()}};
+                                {"seconds", r.seconds}, {"exact", r.exact()}};
+    j["memory_flat"] = r.memoryJudged() ? nlohmann::ordered_json(r.memoryFlat()) : nullptr;  // null: not judged
     for (const StressTally& t : r.executors)
         j["runtimes"].push_back(
             {{"name", t.name}, {"words", t.words}, {"different", t.words_different}, {"not_numbers", t.not_numbers}});

@@ -87,6 +87,18 @@ TEST_F(ReportTool, WhatIsRefused) {
                   .exit_code,
               0);
     refused({"--heatmap", file("second_heat")}, "heat_maps.json: it is of another pack");
+    // Of this pack, but pictures of one state and figures of another.
+    const auto verify = [](const char* state, const char* option, const std::string& to) {
+        return runDimmer({"verify", file("level.gltf"), pack(), "--points", "5", "--paths", "2", "--no-sets", "--state",
+                          state, option, to});
+    };
+    ASSERT_EQ(verify("", "--json", file("all.json")).exit_code, 0);
+    ASSERT_EQ(verify("one=0", "--heatmap", file("one_heat")).exit_code, 0);
+    refused({"--verify", file("all.json"), "--heatmap", file("one_heat")},
+            R"(heat_maps.json: its pictures are of the state "one=0", the figures of --verify of "")");
+    // No pack came of a cook over its budgets, whatever it would have been named.
+    ASSERT_EQ(cook("over.dimmer", {"--set", "budgets.total=1000", "--json", file("over.json")}).exit_code, 3);
+    refused({"--cook", file("over.json")}, "over its budgets");
 }
 
 }  // namespace
