@@ -4,8 +4,12 @@
 #include <charts/raster.h>
 #include <charts/unwrap.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -21,6 +25,10 @@ constexpr uint32_t overlap_grid = 1024;
 constexpr float least_span = 1.0f / 16384;
 // As far beyond 0..1 as tools round, and far less than a texel.
 constexpr float rounding = 1e-5f;
+
+// Texels are sized by their area: where most of a mesh's are this many times as long as wide, light blurs along them
+// and leaks under walls that texels of the same density would not let it. A few odd triangles are no matter.
+constexpr double stretch_max = 2.5, stretched_share_max = 0.1;
 
 // Of a texel: what reaches into it by less is rounding.
 constexpr float least_share = 1e-4f;
@@ -41,6 +49,18 @@ std::optional<UvBounds> boundsOf(const SceneMesh& mesh) {
     return bounds;
 }
 
+// How many times as long as wide a texel of the triangle is: the ratio of the singular values of its map from the
+// unwrap to space, by the trace and the determinant of the map times its transpose.
+double stretchOf(const std::array<glm::vec2, 3>& uv, const std::array<glm::vec3, 3>& p) {
+    const glm::dvec2 a = uv[1] - uv[0], b = uv[2] - uv[0];
+    const glm::dvec3 ap = p[1] - p[0], bp = p[2] - p[0];
+    const double area = a.x * b.y - a.y * b.x;
+    const glm::dvec3 along_u = (ap * b.y - bp * a.y) / area, along_v = (bp * a.x - ap * b.x) / area;
+    const double e = glm::dot(along_u, along_u), f = glm::dot(along_u, along_v), g = glm::dot(along_v, along_v);
+    const double middle = (e + g) / 2, spread = std::sqrt(std::max(0.0, middle * middle - (e * g - f * f)));
+    return std::sqrt((middle + spread) / std::max(middle - spread, 1e-300));
+}
+
 // Why the mesh's TEXCOORD_1 is no unwrap; empty when it is one.
 std::string unwrapFault(const SceneMesh& mesh) {
     const auto bounds = boundsOf(mesh);
@@ -49,10 +69,22 @@ std::string unwrapFault(const SceneMesh& mesh) {
     if (std::min(span.x, span.y) < least_span) return "they span next to nothing";
     std::vector<uint8_t> taken(size_t{overlap_grid} * overlap_grid);
     const glm::vec2 grid = static_cast<float>(overlap_grid) / span;
+    double all_m2 = 0, stretched_m2 = 0, most = 0;
     for (const glm::uvec3 triangle : mesh.triangles) {
         std::array<glm::vec2, 3> uv;
-        for (int i = 0; i < 3; ++i) uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
+        std::array<glm::vec3, 3> p;
+        for (int i = 0; i < 3; ++i) {
+            uv[static_cast<size_t>(i)] = mesh.uv1[triangle[i]];
+            p[static_cast<size_t>(i)] = mesh.positions_m[triangle[i]];
+        }
         if (std::abs(cross2d(uv[1] - uv[0], uv[2] - uv[0])) < 1e-12f) return "a triangle has no area in them";
+        const double area_m2 = glm::length(glm::dvec3(glm::cross(p[1] - p[0], p[2] - p[0]))) / 2;
+        const double stretch = stretchOf(uv, p);
+        all_m2 += area_m2;
+        if (stretch > stretch_max) {
+            stretched_m2 += area_m2;
+            most = std::max(most, stretch);
+        }
         for (auto& c : uv) c = (c - bounds->low) * grid;
         bool overlaps = false;
         forEachCoveredCentre(uv, {overlap_grid, overlap_grid}, [&](uint32_t x, uint32_t y) {
@@ -62,6 +94,7 @@ std::string unwrapFault(const SceneMesh& mesh) {
         });
         if (overlaps) return "they overlap";
     }
+    if (stretched_m2 > stretched_share_max * all_m2) return fmt::format("they are stretched, up to {:.0f} : 1", most);
     return {};
 }
 
@@ -92,11 +125,14 @@ std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span
         while (lower[i] != i) i = lower[i] = lower[lower[i]];
         return i;
     };
-    std::map<std::pair<uint32_t, uint32_t>, uint32_t> triangle_at;  // per corner of the unwrap, by its bits
+    // Per corner, by the bits of its places in the unwrap and in space: islands may touch.
+    std::map<std::array<uint32_t, 5>, uint32_t> triangle_at;
     for (uint32_t i = 0; i < triangles.size(); ++i)
         for (int k = 0; k < 3; ++k) {
-            const glm::vec2 uv = mesh.uv1[mesh.triangles[triangles[i]][k]] + 0.0f;  // -0 is 0
-            const std::pair corner(std::bit_cast<uint32_t>(uv.x), std::bit_cast<uint32_t>(uv.y));
+            const uint32_t vertex = mesh.triangles[triangles[i]][k];
+            const glm::vec2 uv = mesh.uv1[vertex] + 0.0f;  // -0 is 0
+            const glm::vec3 p = mesh.positions_m[vertex] + 0.0f;
+            const auto corner = std::bit_cast<std::array<uint32_t, 5>>(std::array{uv.x, uv.y, p.x, p.y, p.z});
             const uint32_t a = firstOf(i), b = firstOf(triangle_at.try_emplace(corner, i).first->second);
             lower[std::max(a, b)] = std::min(a, b);
         }

@@ -6,6 +6,7 @@
 #include <charts/raster.h>
 #include <pack/pack_data.h>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -312,7 +313,7 @@ std::vector<uint32_t> bySpace(std::span<const TexelSampler::Result> texels) {
 
 }  // namespace
 
-Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max) {
+Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max, Progress* progress) {
     const std::vector<Covered> cover = coverConservatively(unwrap);
     std::vector<size_t> starts;
     for (size_t i = 0; i < cover.size(); ++i)
@@ -322,8 +323,11 @@ Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples
 
     const TexelSampler sampler(rays, unwrap, samples_max);
     std::vector<TexelSampler::Result> results(candidates);
-    tbb::parallel_for(size_t{0}, candidates, [&](size_t i) {
-        results[i] = sampler.sample({cover.data() + starts[i], starts[i + 1] - starts[i]});
+    if (progress) progress->stage("texels", candidates);
+    tbb::parallel_for(tbb::blocked_range<size_t>(0, candidates), [&](const auto& range) {
+        for (size_t i = range.begin(); i < range.end(); ++i)
+            results[i] = sampler.sample({cover.data() + starts[i], starts[i + 1] - starts[i]});
+        if (progress) progress->advance(range.size());
     });
 
     const std::vector<uint32_t> order = bySpace(results);

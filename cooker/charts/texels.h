@@ -1,6 +1,7 @@
 // The receivers of a bake: lightmap texels with their sample points.
 #pragma once
 
+#include <bake/progress.h>
 #include <charts/unwrap.h>
 
 #include <cstdint>
@@ -49,7 +50,7 @@ struct Texels {
 // Up to `samples_max` points per texel, Halton-distributed over what the charts cover of it. Points inside closed
 // geometry are dropped, and so are points that a wall parts from the texel's others; where all lie inside a closed
 // door's leaf, they stay: an opening uncovers them. Deterministic.
-Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max);
+Texels sampleTexels(const RayScene& rays, const Unwrap& unwrap, uint32_t samples_max, Progress* progress = nullptr);
 
 // Where on its page a sample point lies, in texels.
 glm::vec2 placeOnPage(const Texels& texels, size_t receiver, uint32_t i);

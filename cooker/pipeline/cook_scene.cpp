@@ -31,7 +31,8 @@ struct Receivers {
 };
 
 // From the cache or anew.
-Expected<void> findReceivers(const Profile& profile, const Quality& quality, CookCache* cache, Receivers& out) {
+Expected<void> findReceivers(const Profile& profile, const Quality& quality, CookCache* cache, Progress& progress,
+                             Receivers& out) {
     ChartedLevel& level = out.level;
     if (cache) {
         const Key geometry = geometryKey(level.scene);
@@ -48,7 +49,9 @@ Expected<void> findReceivers(const Profile& profile, const Quality& quality, Coo
         }
     }
     if (auto ok = level.chart(profile); !ok) return ok;
-    out.texels = sampleTexels(*level.rays, level.charts, quality.samples_per_texel);
+    // A level in centimetres has ten thousand times as many: that takes minutes, after which nobody reads.
+    if (const auto warning = tooLargeForTexels(*level.rays, level.charts)) progress.warn(*warning);
+    out.texels = sampleTexels(*level.rays, level.charts, quality.samples_per_texel, &progress);
     if (cache) cache->keepCharts(out.key, {level.scene.meshes, level.charts, out.texels});
     return {};
 }
@@ -62,8 +65,7 @@ void warnOfPlaces(const Receivers& at, CookStats& stats) {
     if (auto warning = withoutLight(level.scene)) stats.warnings.push_back(std::move(*warning));
     if (auto warning = tooSmallForTexels(*level.rays, level.charts, at.texels))
         stats.warnings.push_back(std::move(*warning));
-    if (auto warning = tooLargeForTexels(*level.rays, level.charts, at.texels))
-        stats.warnings.push_back(std::move(*warning));
+    if (auto warning = tooLargeForTexels(*level.rays, level.charts)) stats.warnings.push_back(std::move(*warning));
     for (const ChartWarning& w : level.charts.warnings)
         stats.warnings.push_back(
             fmt::format("{}: node '{}': {}", level.scene.file, level.scene.meshes[w.mesh].node, w.text));
@@ -122,7 +124,7 @@ Expected<PackData> cookScene(Scene scene, const Profile& profile, const std::str
     {
         const Stopwatch watch(stats.seconds["charts"]);
         progress.stage("charts", 1);
-        if (auto ok = findReceivers(profile, *quality, cache, at); !ok) return std::unexpected(ok.error());
+        if (auto ok = findReceivers(profile, *quality, cache, progress, at); !ok) return std::unexpected(ok.error());
         progress.advance(1);
         const size_t known = stats.warnings.size();
         warnOfPlaces(at, stats);

@@ -102,14 +102,22 @@ std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap&
         scene.file, few_texels);
 }
 
-std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
-    constexpr size_t texels_min = 1'000'000, texels_per_face = 10'000;  // of real levels' faces: hundreds
-    if (texels.size() < texels_min || texels.size() / unwrap.faces.size() < texels_per_face) return {};
+std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap& unwrap) {
+    constexpr double texels_min = 1e6, texels_per_face = 10'000;  // of real levels' faces: hundreds
+    double texels = 0;
+    for (size_t f = 0; f < unwrap.faces.size(); ++f) {
+        const uint32_t t = unwrap.faces[f].triangle;
+        const glm::vec3 a = rays.corner(t, 0);
+        const float area_m2 = glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a)) / 2;
+        texels += static_cast<double>(area_m2 / unwrap.texel_area_m2[f]);
+    }
+    const auto faces = static_cast<double>(unwrap.faces.size());
+    if (texels < texels_min || texels < texels_per_face * faces) return {};
     const glm::vec3 size = rays.boundsMax() - rays.boundsMin();
     return fmt::format(
         "{}: is {:.0f} x {:.0f} x {:.0f} m large and has {:.1f} million texels on {} faces: is it in metres, as glTF "
         "has it? If so, give its largest nodes fewer texels ('dimmer_texel_density')",
-        rays.scene().file, size.x, size.y, size.z, static_cast<double>(texels.size()) * 1e-6, unwrap.faces.size());
+        rays.scene().file, size.x, size.y, size.z, texels * 1e-6, unwrap.faces.size());
 }
 
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality) {

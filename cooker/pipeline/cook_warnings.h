@@ -31,7 +31,7 @@ std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwr
 std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
 
 // Or the other way round: hundreds of thousands of texels on few triangles.
-std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels);
+std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap& unwrap);
 
 // Of the command line's settings for another quality, which do nothing.
 std::vector<std::string> otherQualities(const Profile& profile, const std::string& quality);

@@ -73,7 +73,7 @@ TEST(FileUv, PiecesWithRoomBetweenStayOneChart) {
 // 1 m is 10 texels, and a square 0.1 of the unwrap. With less than two texels between them, whose two edges filtering
 // reads at both, one would show the other's light.
 TEST(FileUv, PiecesTooCloseToFilterGetChartsOfTheirOwn) {
-    for (const float gap_texels : {0.1f, 0.5f, 1.0f, 1.5f}) {
+    for (const float gap_texels : {0.0f, 0.1f, 0.5f, 1.0f, 1.5f}) {
         const Unwrap charts = chartsOf(twoSquares({0, 0}, {0.1f + 0.01f * gap_texels, 0}));
         EXPECT_EQ(charts.charts.size(), 2u) << gap_texels;
     }
@@ -109,10 +109,30 @@ std::string faultOf(glm::vec2 first, glm::vec2 second, glm::vec2 scale, glm::vec
 TEST(FileUv, OverlapsAreFoundHoweverSmallTheUnwrap) {
     for (const glm::vec2 scale : {glm::vec2(1), {0.01f, 0.01f}, {1, 0.01f}, {0.01f, 1}}) {
         EXPECT_EQ(faultOf({0, 0}, {0.05f, 0.05f}, scale), "they overlap") << scale.x << " " << scale.y;
-        EXPECT_EQ(faultOf({0, 0}, {0.1f, 0}, scale), "") << scale.x << " " << scale.y;
+        EXPECT_EQ(faultOf({0, 0}, {0.1f, 0}, scale), scale.x == scale.y ? "" : "they are stretched, up to 100 : 1");
     }
     EXPECT_EQ(faultOf({0, 0}, {0.1f, 0}, {1, 1e-4f}), "they span next to nothing");
     EXPECT_EQ(faultOf({0, 0}, {0, 0.1f}, {1e-4f, 1}), "they span next to nothing");
+}
+
+// A square of the unwrap on a floor of 2 x 2, 4.8 x 2 and 6 x 2 m: texels as long as they are wide, 2.4 and 3 times.
+TEST(FileUv, WhatIsStretchedIsNotTaken) {
+    for (const float half_m : {1.0f, 2.4f, 3.0f}) {
+        Scene scene;
+        SceneMesh& mesh = addQuad(scene, "floor", {0, 0, 0}, {0, 0, 1}, {1, 0, 0}, 0);
+        mesh.positions_m = {{-half_m, 0, -1}, {-half_m, 0, 1}, {half_m, 0, 1}, {half_m, 0, -1}};
+        scene.materials.push_back(lambert(0.5f));
+        mesh.uv1 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+        dropInvalidUnwraps(scene);
+        EXPECT_EQ(scene.meshes[0].uv1_fault, half_m < 3 ? "" : "they are stretched, up to 3 : 1");
+        // Sheared along, it is not the sides' ratio that counts.
+        SceneMesh& sheared = scene.meshes[0];
+        sheared.positions_m = {
+            {-1 - 3 * half_m, 0, -1}, {-1 + 3 * half_m, 0, 1}, {1 + 3 * half_m, 0, 1}, {1 - 3 * half_m, 0, -1}};
+        sheared.uv1 = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+        dropInvalidUnwraps(scene);
+        EXPECT_TRUE(sheared.uv1_fault.starts_with("they are stretched")) << half_m;
+    }
 }
 
 TEST(FileUv, RoundingBeyondThePageIsNone) {
@@ -124,10 +144,14 @@ TEST(FileUv, RoundingBeyondThePageIsNone) {
     EXPECT_EQ(faultOf(low, high, glm::vec2(std::nanf(""))), "they leave 0..1");
 }
 
+// Islands may touch in the unwrap: one piece is what shares a corner there and in space.
 TEST(FileUv, PiecesShareNoCorner) {
-    const Scene scene = twoSquares({0, 0}, {0.1f, 0.1f});  // at one corner they meet
-    const SceneMesh& mesh = scene.meshes[0];
+    Scene scene = twoSquares({0, 0}, {0.1f, 0.1f});  // at one corner they meet
+    SceneMesh& mesh = scene.meshes[0];
     using Pieces = std::vector<std::vector<uint32_t>>;
+    EXPECT_EQ(unwrapPieces(mesh, std::vector<uint32_t>{0, 1, 2, 3}), (Pieces{{0, 1}, {2, 3}}));
+    const glm::vec3 to_first = mesh.positions_m[2] - mesh.positions_m[4];
+    for (size_t i = 4; i < 8; ++i) mesh.positions_m[i] += to_first;
     EXPECT_EQ(unwrapPieces(mesh, std::vector<uint32_t>{0, 1, 2, 3}), (Pieces{{0, 1, 2, 3}}));
     const Scene apart = twoSquares({0, 0}, {0.5f, 0.1f});
     EXPECT_EQ(unwrapPieces(apart.meshes[0], std::vector<uint32_t>{0, 2, 1, 3}), (Pieces{{0, 2}, {1, 3}}));
