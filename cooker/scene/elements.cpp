@@ -5,10 +5,41 @@
 
 #include <algorithm>
 #include <glm/gtc/quaternion.hpp>
+#include <nlohmann/json.hpp>
+#include <optional>
 
 namespace dimmer::cook {
 
 constexpr double rotation_length_max = 2;  // of a quaternion that was written by hand, as 0 1 0 1
+
+namespace {
+
+using NameLists = std::vector<std::vector<std::string>>;
+
+// None where it is no list of lists of texts, nor the text of one: an editor's custom properties take no such lists.
+std::optional<NameLists> namesOf(const tinygltf::Value& value) {
+    if (value.IsString()) {
+        const auto lists = nlohmann::json::parse(value.Get<std::string>(), nullptr, false);
+        try {
+            return lists.is_array() ? std::optional(lists.get<NameLists>()) : std::nullopt;
+        } catch (const nlohmann::json::exception&) {
+            return std::nullopt;
+        }
+    }
+    if (!value.IsArray()) return std::nullopt;
+    NameLists lists;
+    for (const tinygltf::Value& list : value.Get<tinygltf::Value::Array>()) {
+        if (!list.IsArray()) return std::nullopt;
+        auto& names = lists.emplace_back();
+        for (const tinygltf::Value& name : list.Get<tinygltf::Value::Array>()) {
+            if (!name.IsString()) return std::nullopt;
+            names.push_back(name.Get<std::string>());
+        }
+    }
+    return lists;
+}
+
+}  // namespace
 
 Expected<std::optional<uint32_t>> Elements::lightSet(const Extras& extras) {
     const auto name = extras.text("dimmer_light_set");
@@ -118,10 +149,10 @@ Expected<ElementRef> Elements::named(const std::string& name) const {
                                           : "Correct the name or remove it."));
 }
 
-Expected<void> Elements::combination(const tinygltf::Value& list) {
+Expected<void> Elements::combination(std::span<const std::string> names) {
     std::vector<ElementRef> combination;
-    for (const tinygltf::Value& item : list.Get<tinygltf::Value::Array>()) {
-        const auto element = named(item.Get<std::string>());
+    for (const std::string& name : names) {
+        const auto element = named(name);
         if (!element) return std::unexpected(element.error());
         const auto same = [&](ElementRef other) {
             return other.is_door == element->is_door && other.index == element->index;
@@ -150,17 +181,12 @@ Expected<void> Elements::combination(const tinygltf::Value& list) {
 }
 
 Expected<void> Elements::combinations(const Extras& scene_extras) {
-    const tinygltf::Value* lists = scene_extras.raw("dimmer_combinations");
-    if (lists == nullptr) return {};
-    const auto is_list_of_texts = [](const tinygltf::Value& list) {
-        return list.IsArray() && std::ranges::all_of(list.Get<tinygltf::Value::Array>(),
-                                                     [](const tinygltf::Value& item) { return item.IsString(); });
-    };
-    const auto& all = lists->Get<tinygltf::Value::Array>();  // empty unless it is an array
-    if (!lists->IsArray() || !std::ranges::all_of(all, is_list_of_texts))
-        return context_.error("scene", "'dimmer_combinations' must be a list of lists of names. Correct it.");
-    for (const tinygltf::Value& list : all)
-        if (const auto ok = combination(list); !ok) return ok;
+    const tinygltf::Value* stated = scene_extras.raw("dimmer_combinations");
+    if (stated == nullptr) return {};
+    const auto all = namesOf(*stated);
+    if (!all) return context_.error("scene", "'dimmer_combinations' must be a list of lists of names. Correct it.");
+    for (const auto& names : *all)
+        if (const auto ok = combination(names); !ok) return ok;
     return {};
 }
 

@@ -4,6 +4,7 @@
 #include <scene/extras.h>
 #include <scene/import_context.h>
 
+#include <span>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -39,7 +40,7 @@ class Elements {
     };
     Expected<void> readOpening(const Extras& extras, const std::string& owner, uint32_t door);
     Expected<ElementRef> named(const std::string& name) const;
-    Expected<void> combination(const tinygltf::Value& list);
+    Expected<void> combination(std::span<const std::string> names);
 
     ImportContext& context_;
     std::unordered_map<std::string, uint32_t> set_of_name_, door_of_name_;

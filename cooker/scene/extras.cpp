@@ -127,18 +127,25 @@ Expected<std::optional<size_t>> Extras::choice(std::string_view key,
     return static_cast<size_t>(found - choices.begin());
 }
 
+// "Dimmer light-set" is a slip of who types into an editor's field.
+std::string asKeysAreWritten(std::string key) {
+    for (char& c : key) c = c == ' ' || c == '-' ? '_' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return key;
+}
+
 void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, ExtrasPlace place,
                      const std::string& owner) {
     const auto here = place == ExtrasPlace::Node ? std::span<const std::string_view>(node_keys) : scene_keys;
     const auto elsewhere = place == ExtrasPlace::Node ? std::span<const std::string_view>(scene_keys) : node_keys;
     for (const std::string& key : extras.Keys()) {
-        if (!key.starts_with("dimmer_") || contains(here, key)) continue;
+        const std::string meant = asKeysAreWritten(key);
+        if (!meant.starts_with("dimmer_") || contains(here, key)) continue;
         if (contains(elsewhere, key))
             context.warn(owner, fmt::format("'{}' has no meaning here and was ignored; it belongs in the extras of {}.",
                                             key, place == ExtrasPlace::Node ? "the scene" : "a node"));
         else
-            context.warn(owner,
-                         fmt::format("'{}' is not a known key and was ignored; did you mean '{}'?", key, nearest(key)));
+            context.warn(
+                owner, fmt::format("'{}' is not a known key and was ignored; did you mean '{}'?", key, nearest(meant)));
     }
 }
 

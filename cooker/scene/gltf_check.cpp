@@ -13,7 +13,7 @@ constexpr std::array<std::string_view, 6> known_extensions = {
 constexpr const char* lights_extension = "KHR_lights_punctual";
 
 // Gloss, notes, and other ways to data that a file which does not require them has in the usual way too.
-constexpr std::array<std::string_view, 16> harmless_extensions = {
+constexpr std::array<std::string_view, 17> harmless_extensions = {
     "EXT_meshopt_compression",   "EXT_texture_webp",
     "KHR_animation_pointer",     "KHR_draco_mesh_compression",
     "KHR_materials_anisotropy",  "KHR_materials_clearcoat",
@@ -21,17 +21,20 @@ constexpr std::array<std::string_view, 16> harmless_extensions = {
     "KHR_materials_iridescence", "KHR_materials_sheen",
     "KHR_materials_variants",    "KHR_materials_volume",
     "KHR_texture_basisu",        "KHR_xmp",
-    "KHR_xmp_json_ld",           "MSFT_texture_dds"};
+    "KHR_xmp_json_ld",           "MSFT_lod",
+    "MSFT_texture_dds"};
 
 struct IgnoredExtension {
     std::string_view name, loss;
 };
-constexpr std::array<IgnoredExtension, 3> lossy_extensions = {
+constexpr std::array<IgnoredExtension, 5> lossy_extensions = {
     {{"EXT_mesh_gpu_instancing",
       "each node that has it stands there once, by its own transform. Export its instances as nodes."},
      {"KHR_materials_pbrSpecularGlossiness",
       "a material without metallic-roughness values besides is white metal. Convert the materials to "
       "metallic-roughness."},
+     {"KHR_materials_unlit", "surfaces that have it are lit and reflect as others do."},
+     {"KHR_node_visibility", "what is hidden is baked as if it were seen. Export the level without hidden nodes."},
      {"KHR_materials_transmission",
       "what lets light through by it alone is opaque. Give such glass alphaMode BLEND and an alpha below 1."}}};
 
@@ -212,6 +215,15 @@ Expected<void> checkModel(const ImportContext& context) {
 
 bool isKnownExtension(std::string_view name) {
     return std::ranges::count(known_extensions, name) > 0;
+}
+
+void warnOfOtherScenes(ImportContext& context) {
+    const auto& scenes = context.model.scenes;
+    if (scenes.size() < 2) return;
+    const auto used = static_cast<size_t>(std::max(context.model.defaultScene, 0));
+    context.warn("scenes", fmt::format("the level is scene {}{}; the file's other {} left out. Export one scene.", used,
+                                       scenes[used].name.empty() ? "" : fmt::format(" ('{}')", scenes[used].name),
+                                       scenes.size() == 2 ? "one is" : fmt::format("{} are", scenes.size() - 1)));
 }
 
 void warnOfExtensions(ImportContext& context) {

@@ -15,6 +15,9 @@ bool isKnownExtension(std::string_view name);
 // Warns of extensions that are used, and ignored at a loss.
 void warnOfExtensions(ImportContext& context);
 
+// Warns of scenes that are not the level's.
+void warnOfOtherScenes(ImportContext& context);
+
 // The light that a node refers to; empty when none. Valid after checkModel.
 std::optional<int> lightOf(const tinygltf::Node& node);
 

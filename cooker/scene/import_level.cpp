@@ -40,6 +40,7 @@ class LevelImporter {
     Expected<void> prepare() {
         if (const auto ok = checkModel(context_); !ok) return ok;
         warnOfExtensions(context_);
+        warnOfOtherScenes(context_);
         auto placed = placeNodes(context_);
         if (!placed) return std::unexpected(placed.error());
         placed_ = std::move(*placed);

@@ -10,10 +10,16 @@ namespace dimmer {
 namespace {
 
 Expected<void> checkHandles(const VulkanContext& vulkan) {
-    if (!vulkan.instance || !vulkan.physical_device || !vulkan.device || !vulkan.queue)
+    const char* missing = !vulkan.instance          ? "instance"
+                          : !vulkan.physical_device ? "physical_device"
+                          : !vulkan.device          ? "device"
+                          : !vulkan.queue           ? "queue"
+                                                    : nullptr;
+    if (missing)
         return fail(ErrorCode::InvalidArgument,
-                    "The Vulkan device is given with a null handle; instance, physical device, device and queue are "
-                    "all needed.");
+                    fmt::format("The Vulkan device is given with a null {}; instance, physical_device, device and "
+                                "queue are all needed.",
+                                missing));
     if (!vulkan.queue_lock.lock != !vulkan.queue_lock.unlock)
         return fail(ErrorCode::InvalidArgument,
                     "The queue has a function to lock it or to unlock it alone: give both.");

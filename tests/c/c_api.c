@@ -268,12 +268,15 @@ int blend_on_vulkan(const char* path, const dimmer_vulkan* vulkan, uint32_t* irr
     const uint32_t *own_irradiance, *own_direction;
     size_t own_count;
     int failed;
-    const dimmer_vulkan_options unknown = {.buffering = (dimmer_buffering)2}, many = {.frames_in_flight = 9};
+    const dimmer_vulkan_options unknown = {.buffering = (dimmer_buffering)2},
+                                below = {.buffering = (dimmer_buffering)-1}, many = {.frames_in_flight = 9};
     uint32_t* by_submit = malloc(8 * texel_count);
     EXPECT(by_submit != NULL);
     EXPECT_OK(dimmer_pack_open(path, &pack));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "2 is no dimmer_buffering",
                    dimmer_lights_create_vulkan(pack, vulkan, &unknown, &lights));
+    EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "-1 is no dimmer_buffering",
+                   dimmer_lights_create_vulkan(pack, vulkan, &below, &lights));
     EXPECT_FAILURE(DIMMER_INVALID_ARGUMENT, "frames_in_flight is 9",
                    dimmer_lights_create_vulkan(pack, vulkan, &many, &lights));
     EXPECT_OK(dimmer_lights_create_vulkan(pack, vulkan, NULL, &lights));

@@ -451,6 +451,23 @@ TEST(SceneElements, CombinationsOfUnknownElementsAreRefused) {
     }
 }
 
+// As an editor's custom property, which is a text: the same combination.
+TEST(SceneElements, CombinationsMayBeText) {
+    LevelFile level = levelWithLamp({{"dimmer_light_set", "hall"}});
+    for (const char* name : {"front", "back"})
+        level.addNode({{"name", name}, {"mesh", level.addSquareMesh(0)}, {"extras", {{"dimmer_door", name}}}});
+    json& combinations = level.document["scenes"][0]["extras"]["dimmer_combinations"];
+    combinations = R"([["door:front", "door:back", "hall"]])";
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    ASSERT_EQ(scene->combinations.size(), 1u);
+    EXPECT_EQ(scene->combinations[0].size(), 3u);
+    for (const char* bad : {"", "[", "[1]", R"(["hall"])", R"({"a": [["hall"]]})", R"([["door:front", 1]])"}) {
+        combinations = bad;
+        expectBadInput(level.import(), {"dimmer_combinations", "list of lists"});
+    }
+}
+
 TEST(SceneElements, NamesThatAStateCannotSayAreRefused) {
     for (const char* name : {" hall", "hall ", " ", "", "a,b", "a=b", "all", "always", "door:x"})
         expectBadInput(levelWithLamp({{"dimmer_light_set", name}}).import(), {"node 'lamp'", name});
@@ -466,6 +483,25 @@ TEST(SceneElements, UnknownKeysGetTheNearestKnownOne) {
     expectWarning(*scene, {"node 'lamp'", "'dimmer_lightset'", "'dimmer_light_set'"});
     expectWarning(*scene, {"material 'white'", "'dimmer_sky_color'", "belongs in the extras of the scene"});
     expectWarning(*scene, {"scene", "'dimmer_sky_colour'", "'dimmer_sky_color'"});
+}
+
+TEST(SceneElements, KeysInAnotherSpellingAreTold) {
+    for (const char* key : {"Dimmer_light_set", "DIMMER_LIGHT_SET", "dimmer-light-set", "dimmer light set"}) {
+        const auto scene = levelWithLamp({{key, "hall"}}).import();
+        ASSERT_IMPORTED(scene);
+        EXPECT_TRUE(scene->light_sets.empty());
+        EXPECT_EQ(scene->warnings.size(), 1u);
+        expectWarning(*scene, {"node 'lamp'", key, "did you mean 'dimmer_light_set'"});
+    }
+}
+
+TEST(SceneElements, OtherScenesAreTold) {
+    LevelFile level = levelWithLamp({});
+    level.document["scenes"].push_back({{"name", "backstage"}, {"nodes", json::array({0})}});
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 1u);
+    expectWarning(*scene, {"the level is scene 0", "other one is left out"});
 }
 
 TEST(SceneElements, WrongTypesNameNodeAndKey) {

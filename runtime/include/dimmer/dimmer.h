@@ -168,9 +168,9 @@ typedef struct dimmer_lights dimmer_lights;
  * model takes a multiple of 8. Keeps what it needs of the pack alive. */
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights);
-/* Null is allowed. Waits for what dimmer_lights_submit() sent, and for nothing else: of the caller's submissions those
- * must have completed that have a recorded update in them, read images, probes or the grid's tables, or wait for the
- * lights' semaphore. */
+/* Null is allowed. Waits for what dimmer_lights_submit() and dimmer_lights_continue_loading() sent, and for nothing
+ * else: of the caller's submissions those must have completed that have a recorded update in them, read images, probes
+ * or the grid's tables, or wait for the lights' semaphore. */
 void dimmer_lights_destroy(dimmer_lights* lights);
 
 /* Changes cost nanoseconds and take effect with the next update. At the start every light set is at 1 (or its maximum,
@@ -293,7 +293,8 @@ typedef struct dimmer_vulkan {
 typedef enum dimmer_buffering {
     DIMMER_IN_PLACE = 0,        /* updates write the pages and probes that frames read, between barriers of their own */
     DIMMER_DOUBLE_BUFFERED = 1, /* two sets of pages and of probes that take turns; twice the memory for both */
-    DIMMER_BUFFERING_MAX_ENUM = 0x7fffffff /* none: so that any int is a value, and refused */
+    DIMMER_BUFFERING_MIN_ENUM = -0x7fffffff, /* these two are none: any int is a value, and refused */
+    DIMMER_BUFFERING_MAX_ENUM = 0x7fffffff
 } dimmer_buffering;
 
 /* All 0 is the default. */
