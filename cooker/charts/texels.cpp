@@ -28,6 +28,8 @@ constexpr uint32_t doubtful_backs_min = 4;
 // There is air where ten of the rays along a surface, nearly, get so far without meeting a back.
 constexpr uint32_t horizon_rays = 16, horizon_open_min = 10;
 constexpr float horizon_sine = 0.1f, horizon_open_m = 1;
+// So near behind a door's leaf nobody sees a surface.
+constexpr float behind_leaf_m = 0.05f;
 // A texel whose first points all lie inside geometry is given up.
 constexpr uint32_t drops_max = 24;
 constexpr float steps_per_texel = TexelPoint::steps;
@@ -114,7 +116,7 @@ class TexelSampler {
         Usable usable;
         for (const glm::u16vec2 within : tries_) {
             if (result.points.size() >= samples_max_) break;
-            if (result.points.empty() && usable.dropped >= drops_max) break;
+            if (result.points.empty() && usable.dropped + usable.behindLeaves() >= drops_max) break;
             if (const auto at = surfaceAt(faces, corner, within)) tryPoint(corner, *at, usable, result);
         }
         float largest = 0;
@@ -130,12 +132,15 @@ class TexelSampler {
             centroid = {c.face, steps.x, steps.y};
         }
         if (usable.tried == 0 && largest > 0) tryPoint(corner, centroid, usable, result);
-        if (usable.dropped > result.points.size())
+        if (usable.dropped > result.points.size() + usable.behindLeaves())
             std::erase_if(result.points, [&](const TexelPoint& p) {
                 return std::ranges::find(usable.doubtful, p) != usable.doubtful.end();
             });
-        // All of it lies in a closed door's leaf: what an opening uncovers.
-        if (result.points.empty()) result.points = std::move(usable.in_leaf);
+        // All of it lies behind doors' leaves, or in one: what is seen while they are closed, while they are open, or
+        // what the door's other state uncovers.
+        for (auto* points : {&usable.behind_open, &usable.behind_closed, &usable.behind_both, &usable.in_leaf})
+            if (result.points.empty()) result.points = std::move(*points);
+        if (result.points.size() > samples_max_) result.points.resize(samples_max_);
         // Few points may all lie in holes of what rays do hit.
         if (usable.tried > 0 && usable.alpha == 0)
             for (const glm::u16vec2 within : tries_)
@@ -170,6 +175,9 @@ class TexelSampler {
         float alpha = 0;                   // sum over what the reflectance was added up over
         std::vector<TexelPoint> in_leaf;   // of the dropped ones
         std::vector<TexelPoint> doubtful;  // of the others: where most are dropped they are, too
+        // Of the others, close behind a leaf as it stands closed, or open: they count where a texel has no better.
+        std::vector<TexelPoint> behind_closed, behind_open, behind_both;
+        size_t behindLeaves() const { return behind_closed.size() + behind_open.size() + behind_both.size(); }
     };
 
     // Of what is solid.
@@ -184,7 +192,11 @@ class TexelSampler {
         const Side side = sideOf({position, p.face}, Surfaces::All, nearest);
         if (side == Side::Doubtful) usable.doubtful.push_back(p);
         if (side != Side::In) {
-            result.points.push_back(p);
+            const auto [closed, open] = behindLeaf(p, position);
+            (closed ? open ? usable.behind_both : usable.behind_closed
+             : open ? usable.behind_open
+                    : result.points)
+                .push_back(p);
             return;
         }
         ++usable.dropped;
@@ -192,6 +204,19 @@ class TexelSampler {
         if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ &&
             sideOf({position, p.face}, Surfaces::Walls, stays) != Side::In)
             usable.in_leaf.push_back(p);
+    }
+
+    // Of one that stands closed, and of one that stands open. The gap behind a leaf that hangs in front of its opening
+    // is as bright as the room beyond: beside the leaf a texel would show that all along its edge.
+    std::pair<bool, bool> behindLeaf(const TexelPoint& p, glm::vec3 position) const {
+        std::pair<bool, bool> behind{false, false};
+        const bool of_leaf = rays_.triangles()[unwrap_.faces[p.face].triangle].condition != no_condition;
+        if (!rays_.anyLeaf() || of_leaf) return behind;
+        LeafHits leaves;
+        rays_.nearest(position, unwrap_.frames[p.face].normal, behind_leaf_m, 0, Surfaces::Walls, no_model, &leaves);
+        for (const Hit& hit : leaves)
+            (rays_.triangles()[hit.triangle].condition % 2 == 0 ? behind.first : behind.second) = true;
+        return behind;
     }
 
     // Light that hits a texel hits it where it is not cut out: colours count by how much of it they stop.

@@ -159,6 +159,42 @@ TEST(Texels, BelowADecalAreLit) {
     }
 }
 
+// A trapdoor's leaf 1 cm over a floor of texels of 25 cm, from x = -0.1 on. Where it stops within a texel no point is
+// behind it; further in, where a texel has no other points, all are, as the open door uncovers them.
+TEST(Texels, BesideALeafAreNotBehindIt) {
+    for (const bool open_pose : {false, true}) {
+        Scene scene;
+        const uint32_t white = addMaterial(scene, lambert(0.5f));
+        addFloor(scene, 1, white);
+        scene.doors.push_back({.name = "trap", .pose = open_pose});
+        SceneMesh& leaf = addQuad(scene, "leaf", {0.45f, 0.01f, 0}, {0.55f, 0, 0}, {0, 0, 1}, white);  // its lower side
+        leaf.door = 0;
+        // Open, it slides aside by half: what it covers in both states, and what in one.
+        if (open_pose) leaf.open_from_closed[3] = glm::dvec4(-0.5, 0, 0, 1);
+        if (open_pose) addOpenLeaves(scene);
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 64});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 8);
+        size_t floors = 0;
+        for (size_t i = 0; i < texels.size(); ++i) {
+            const auto pointAt = [&](uint32_t s) { return samplePoint(rays, *charts, texels, i, s).position_m; };
+            if (charts->frames[samplePoint(rays, *charts, texels, i, 0).face].normal.y < 0) continue;  // of the leaf
+            ++floors;
+            EXPECT_EQ(texels.sampleCount(i), 8u);
+            const float begin_m = std::floor(pointAt(0).x * 4) / 4;  // of the texel
+            for (uint32_t s = 0; s < texels.sampleCount(i); ++s) {
+                const float x = pointAt(s).x;
+                // Closed it covers -0.1 .. 1, open -0.6 .. 0.5.
+                const bool stops_here = begin_m == -0.25f || (open_pose && begin_m == -0.75f);
+                const float edge_m = begin_m == -0.75f ? -0.6f : -0.1f;
+                EXPECT_TRUE(!stops_here || x < edge_m) << x;
+            }
+        }
+        EXPECT_EQ(floors, 64u);
+    }
+}
+
 TEST(Texels, OfStepsThatTouchSeeTheRoom) {
     for (const float angle : {0.0f, 0.12f})
         for (const float texels_per_metre : {2.0f, 4.0f}) {

@@ -54,7 +54,7 @@ TEST(WallCuts, AnUnwrapThatIsPartedAtWallsIsNotWarnedOf) {
 TEST(WallCuts, AnUnwrappedNeighbourIsLeftOut) {
     Scene scene = twoRooms();
     const size_t floor = 3;  // its upper side, which goes on in a strip of 8 x 1 m
-    addQuad(scene, "strip", {0, 0, 2}, {0, 0, 0.5f}, {4, 0, 0}, 0).uv1 = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    addQuad(scene, "strip", {0, 0, 2}, {0, 0, 0.5f}, {4, 0, 0}, 0).uv1 = {{0, 0}, {0.125f, 0}, {0.125f, 1}, {0, 1}};
     cutAtWalls(scene, 4);
     EXPECT_GT(scene.meshes[floor].triangles.size(), 2u);
     EXPECT_EQ(scene.meshes.back().triangles.size(), 2u);
