@@ -1,13 +1,12 @@
 #include <app/budget_json.h>
 #include <app/cook_json.h>
+#include <app/files.h>
 #include <app/pack_id.h>
 #include <dimmer/version.h>
 #include <pipeline/settings.h>
 #include <write/pack_writer.h>
 
 #include <fmt/format.h>
-
-#include <fstream>
 
 namespace dimmer::cook {
 namespace {
@@ -56,13 +55,6 @@ void addTimes(const CookStats& stats, Json& json) {
     json["peak_bytes"] = stats.peak_bytes;
 }
 
-bool isCookJson(const std::string& file) {
-    const auto shallow = [](int depth, nlohmann::json::parse_event_t, const nlohmann::json&) { return depth < 2; };
-    std::ifstream in(file);
-    const auto json = nlohmann::json::parse(in, shallow, false);
-    return json.is_object() && json.contains("rays_per_second") && json.contains("peak_bytes");
-}
-
 }  // namespace
 
 Json suggestionsJson(const CookStats& stats) {
@@ -95,13 +87,7 @@ Json cookJson(Verdict verdict, const CookOptions& options, const std::vector<std
 }
 
 Expected<void> removeCookJson(const std::string& file) {
-    std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error) || !isCookJson(file)) return {};
-    const auto target = behindLinks(file);
-    if (!target) return std::unexpected(target.error());
-    if (std::filesystem::remove(*target, error) || !error) return {};
-    return fail(ErrorCode::Io, fmt::format("--json {}: what an earlier cook wrote there cannot be removed: {}", file,
-                                           error.message()));
+    return removeEarlierJson(file, {"rays_per_second", "peak_bytes"});
 }
 
 }  // namespace dimmer::cook

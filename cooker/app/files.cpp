@@ -6,8 +6,11 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 namespace dimmer::cook {
@@ -91,6 +94,20 @@ Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vecto
         if (auto ok = outputs[i].folder ? checkFolder(outputs[i]) : checkWritable(outputs[i].path); !ok) return ok;
     }
     return {};
+}
+
+Expected<void> removeEarlierJson(const std::string& file, const std::vector<std::string>& keys) {
+    std::error_code error;
+    if (!std::filesystem::is_regular_file(file, error)) return {};
+    std::ifstream in(file);
+    const auto shallow = [](int depth, nlohmann::json::parse_event_t, const nlohmann::json&) { return depth < 2; };
+    const auto json = nlohmann::json::parse(in, shallow, false);
+    if (!json.is_object() || !std::ranges::all_of(keys, [&](const auto& key) { return json.contains(key); })) return {};
+    const auto target = behindLinks(file);
+    if (!target) return std::unexpected(target.error());
+    if (std::filesystem::remove(*target, error) || !error) return {};
+    return fail(ErrorCode::Io,
+                fmt::format("--json {}: what an earlier run wrote there cannot be removed: {}", file, error.message()));
 }
 
 }  // namespace dimmer::cook

@@ -31,6 +31,10 @@ void addFilesOf(const std::string& role, const std::vector<std::filesystem::path
 // The files that are in `folder` by names that `isOne` takes; none where there is no folder.
 std::vector<std::filesystem::path> filesIn(const std::filesystem::path& folder, bool (*isOne)(std::string_view name));
 
+// Removes what an earlier run wrote there as its --json, so that nobody takes it for this one's. It is known by these
+// keys; anything else of that name stays.
+Expected<void> removeEarlierJson(const std::string& file, const std::vector<std::string>& keys);
+
 // An error where an output is an input or another output too, by whatever name or link, or cannot be written. Devices
 // and pipes may be both: nothing in them is lost.
 Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vector<NamedFile>& outputs);

@@ -2,6 +2,7 @@
 #include <pipeline/fit_ways.h>
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 #include <utility>
 

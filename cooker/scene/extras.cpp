@@ -48,6 +48,12 @@ std::string_view nearest(std::string_view key) {
     return best;
 }
 
+// "Dimmer light-set" is a slip of who types into an editor's field.
+std::string asKeysAreWritten(std::string key) {
+    for (char& c : key) c = c == ' ' || c == '-' ? '_' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    return key;
+}
+
 bool isFiniteNumber(const tinygltf::Value& value) {
     return value.IsNumber() && isFiniteFloat(value.GetNumberAsDouble());
 }
@@ -125,12 +131,6 @@ Expected<std::optional<size_t>> Extras::choice(std::string_view key,
     if (found == choices.end())
         return wrongType(key, fmt::format("'{}', not '{}'", fmt::join(choices, "', '"), **value));
     return static_cast<size_t>(found - choices.begin());
-}
-
-// "Dimmer light-set" is a slip of who types into an editor's field.
-std::string asKeysAreWritten(std::string key) {
-    for (char& c : key) c = c == ' ' || c == '-' ? '_' : c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-    return key;
 }
 
 void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, ExtrasPlace place,

@@ -1,4 +1,4 @@
-// `dimmer verify` as a gate of a pipeline.
+// `dimmer verify` and `dimmer stress` as gates of a pipeline.
 #include <app/tool_fixture.h>
 
 namespace dimmer::test {
@@ -7,27 +7,34 @@ namespace {
 using testing::HasSubstr;
 
 using VerifyCommand = ToolTest;
+using StressCommand = ToolTest;
 
 ProcessResult gate(const std::string& level, const std::string& pack, int paths, int seed, const char* max_error) {
     return runDimmer({"verify", level, pack, "--points", "20", "--no-sets", "--paths", std::to_string(paths), "--seed",
                       std::to_string(seed), "--max-error", max_error, "--json", "-"});
 }
 
+// Cooked from the level with so much of its lamps' light.
+std::string dimmed(const cook::test::TemporaryFolder& folder, const std::string& quick, double share) {
+    auto level = cook::test::twoCells();
+    for (json& light : level.document["extensions"]["KHR_lights_punctual"]["lights"])
+        light["intensity"] = share * light["intensity"].get<double>();
+    const std::string pack = (folder.path / "dim.dimmer").string();
+    const auto cooked = runDimmer(
+        {"cook", cook::test::writeLevel(folder, level).string(), "-o", pack, "--profile", quick, "--quality", "draft"});
+    EXPECT_EQ(cooked.exit_code, 0) << cooked.err;
+    return pack;
+}
+
 // A pack whose lamps have nine tenths of their light is a tenth too dark: with a reference of few paths, taking its
 // noise off what is measured leaves anything down to nothing, and passed one time in a few.
 TEST_F(VerifyCommand, NoiseLetsNothingPass) {
-    auto dim = cook::test::twoCells();
-    for (json& light : dim.document["extensions"]["KHR_lights_punctual"]["lights"])
-        light["intensity"] = 0.9 * light["intensity"].get<double>();
-    cook::test::TemporaryFolder folder;
-    const std::string level = cook::test::writeLevel(folder, dim).string();
-    const auto cooked =
-        runDimmer({"cook", level, "-o", file("dim.dimmer"), "--profile", file("quick.json"), "--quality", "draft"});
-    ASSERT_EQ(cooked.exit_code, 0) << cooked.err;
+    const cook::test::TemporaryFolder folder;
+    const std::string dim = dimmed(folder, file("quick.json"), 0.9);
     int below = 0;  // by what is left without the noise
     for (const int paths : {2, 4, 8, 16})
         for (int seed = 1; seed <= 6; ++seed) {
-            const auto result = gate(file("level.gltf"), file("dim.dimmer"), paths, seed, "0.05");
+            const auto result = gate(file("level.gltf"), dim, paths, seed, "0.05");
             EXPECT_EQ(result.exit_code, 4) << paths << " " << seed << " " << result.err;
             below += json::parse(result.out)["surface"]["mean"] <= 0.05;
         }
@@ -42,6 +49,21 @@ TEST_F(VerifyCommand, SaysWhereNoiseHidesTheError) {
     EXPECT_EQ(gate(file("level.gltf"), pack(), 2, 1, "100").exit_code, 0);
     // No number of paths is enough for nothing.
     EXPECT_THAT(gate(file("level.gltf"), pack(), 2, 1, "0").err, HasSubstr("is above 0"));
+}
+
+// Nine tenths of the light are missing, which the noise of 16 paths, a tenth, cannot be.
+TEST_F(VerifyCommand, NoiseIsNotBlamedForWhatIsFarAbove) {
+    const cook::test::TemporaryFolder folder;
+    const auto result = gate(file("level.gltf"), dimmed(folder, file("quick.json"), 0.1), 16, 1, "0.05");
+    EXPECT_EQ(result.exit_code, 4);
+    EXPECT_THAT(result.err, HasSubstr("is above 0.05"));
+    EXPECT_THAT(result.err, testing::Not(HasSubstr("hides")));
+}
+
+TEST_F(StressCommand, MemoryThatWasNotJudgedIsNotCalledFlat) {
+    const auto result = runDimmer({"stress", pack(), "--cpu", "--frames", "50", "--json", file("stress.json")});
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_TRUE(json::parse(readText(file("stress.json")))["memory_flat"].is_null());
 }
 
 TEST_F(VerifyCommand, AVerdictThatFailsLeavesNoEarlierOne) {
