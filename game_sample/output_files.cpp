@@ -54,8 +54,10 @@ Expected<void> prepareFolder(const fs::path& folder, const std::vector<fs::path>
     std::error_code failed, ignored;
     fs::create_directories(folder, failed);
     std::vector<fs::path> old;
-    for (fs::directory_iterator entry(folder, failed); !failed && entry != fs::end(entry); entry.increment(failed))
-        if (isOfARun(entry->path().filename().native()) && !entry->is_directory(ignored)) old.push_back(entry->path());
+    if (!failed)
+        for (fs::directory_iterator entry(folder, failed); !failed && entry != fs::end(entry); entry.increment(failed))
+            if (isOfARun(entry->path().filename().native()) && !entry->is_directory(ignored))
+                old.push_back(entry->path());
     if (failed) return fail(ErrorCode::Io, fmt::format("{}: {}.", folder.string(), failed.message()));
     for (const fs::path& file : old)
         for (const fs::path& input : inputs)

@@ -204,7 +204,7 @@ Expected<void> measureModes(const Pack& pack, std::span<const Mode> chosen, cons
             report.driver = device->driver();
             VkPhysicalDeviceProperties properties;
             vkGetPhysicalDeviceProperties(device->context().physical_device, &properties);
-            if (properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU) report.clock = "process";
+            report.clock = properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? "process" : "gpu";
         }
         auto measured = measureVulkan(pack, *device, mode, options, report);
         // The naive modes cannot hold what large packs have; what the others measured stands.

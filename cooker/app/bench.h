@@ -39,7 +39,7 @@ struct CaseResult {
     std::string name, mode;
     uint32_t sets = 0;    // BenchCase::sets
     UpdateStats largest;  // of the update that moved the most bytes
-    Spread gpu_us;        // on the GPU's clock
+    Spread gpu_us;        // on the GPU's clock; nothing for the mode "cpu"
     Spread host_us;       // of planning and recording
     // Of the whole process over the number of processors: on a Vulkan device that is a CPU, the time an update takes
     // where nothing else runs, and steady where something does. What one thread does alone, as planning, counts for a
@@ -52,7 +52,7 @@ struct CaseResult {
 
 struct BenchReport {
     std::string device = "none (CPU only)", driver = "none";
-    std::string clock = "gpu";  // "process" on a Vulkan device that is a CPU
+    std::string clock = "host";  // of what is compared: "gpu", "process" on a Vulkan device that is a CPU
     std::vector<CaseResult> results;
 };
 

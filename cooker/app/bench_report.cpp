@@ -32,7 +32,7 @@ nlohmann::ordered_json toJson(const CaseResult& r) {
             {"batches", r.largest.batches},
             {"dispatches", r.largest.dispatches},
             {"bytes", bytesOf(r.largest)},
-            {"gpu_us", toJson(r.gpu_us)},
+            {"gpu_us", r.mode == "cpu" ? nlohmann::ordered_json(nullptr) : toJson(r.gpu_us)},
             {"host_us", toJson(r.host_us)},
             {"process_us", toJson(r.process_us)},
             {"roof_us", toJson(r.roof_us)},

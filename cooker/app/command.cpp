@@ -47,4 +47,9 @@ std::string refuseNotFinite(const std::string& text) {
     return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is no finite number";
 }
 
+std::string refuseNoShare(const std::string& text) {
+    if (std::strtod(text.c_str(), nullptr) < 0) return "a share of 0 or more is due, not " + text;
+    return refuseNotFinite(text);
+}
+
 }  // namespace dimmer::cook

@@ -46,5 +46,6 @@ Expected<void> writeReport(const Pack& pack, const ReportInput& input, const std
 
 // For CLI::Option::check(): its own checks of ranges let "nan" pass.
 std::string refuseNotFinite(const std::string& text);
+std::string refuseNoShare(const std::string& text);  // what is negative or not finite
 
 }  // namespace dimmer::cook

@@ -266,8 +266,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
          "exit with 3 instead where --fit would add a larger mean error as predicted, at surfaces or to the light of "
          "models, e.g. 0.05 for 5 %")
         ->needs(fit)
-        ->check(refuseNotFinite)
-        ->check(CLI::NonNegativeNumber);
+        ->check(refuseNoShare);
     c->add_flag("--explain-cache", a->explain_cache, "say what was reused, and why the rest was not")
         ->excludes(no_cache)
         ->excludes(per_set_passes)

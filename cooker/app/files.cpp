@@ -98,7 +98,7 @@ Expected<void> checkFiles(const std::vector<NamedFile>& inputs, const std::vecto
 
 Expected<void> removeEarlierJson(const std::string& file, const std::vector<std::string>& keys) {
     std::error_code error;
-    if (!std::filesystem::is_regular_file(file, error)) return {};
+    if (file == "-" || !std::filesystem::is_regular_file(file, error)) return {};
     std::ifstream in(file);
     const auto shallow = [](int depth, nlohmann::json::parse_event_t, const nlohmann::json&) { return depth < 2; };
     const auto json = nlohmann::json::parse(in, shallow, false);

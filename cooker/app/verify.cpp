@@ -242,10 +242,7 @@ void addVerifyCommand(CLI::App& app, int& exit_code) {
          "--max-error", a->max_error,
          "exit with 4 when the mean error at surfaces is above, e.g. 0.1 for 10 %, or the reference's noise hides "
          "whether it is")
-        ->check(refuseNotFinite)
-        ->check([](const std::string& text) {
-            return text.starts_with('-') ? "a share of 0 or more is due, not " + text : std::string();
-        });
+        ->check(refuseNoShare);
     c->add_option("--heatmap", a->heatmap,
                   "write the pages as PNGs there, points in blue (too dark) to red (too bright)");
     c->add_option("--csv", a->csv,

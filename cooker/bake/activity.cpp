@@ -1,5 +1,6 @@
 #include <bake/activity.h>
 
+#include <bake/spread.h>
 #include <bake/sums.h>
 
 #include <algorithm>
@@ -13,10 +14,18 @@ namespace {
 constexpr int activity_reach = 2;
 constexpr float around_texel_sizes = 4;  // from corner to corner of so many texels, wherever in them samples lie
 
+// What receivers inside of a lamp's casing have, ten thousand times the room's, is no measure of its light: of each no
+// more counts than so many times the median. Of what lamps do to rooms hardly anything is above.
+constexpr double counts_medians_max = 20;
+
 // A term with doors ends at the threshold's share of so many times the mean of what its group changes around the door.
 // What lies below is then about as little of the change as what other terms lose is of their light: the mean counts
 // many receivers that the door hardly changes, theirs only such as are lit straight.
 constexpr float door_change_factor = 3;
+// Beside a sunlit yard all light of a hall is less than that. What doors let in of always-on light is seen beside what
+// of it is there anyhow, which nobody switches off: by so many times the threshold's share of that a term of such light
+// may end below its own threshold, down to a share of it.
+constexpr float always_on_factor = 3, dark_threshold_share = 0.2f;
 
 }  // namespace
 
@@ -24,10 +33,12 @@ constexpr float door_change_factor = 3;
 // send around doors.
 struct Activity::Around {
     Sums lux, receivers;
+    std::vector<Spread> spread;  // per light group
     DoorSurroundings doors;
     Around& operator+=(const Around& o) {
         lux += o.lux;
         receivers += o.receivers;
+        for (size_t g = 0; g < spread.size(); ++g) spread[g] += o.spread[g];
         doors += o.doors;
         return *this;
     }
@@ -37,26 +48,36 @@ std::vector<TermReport> Activity::thresholds(const Series& light, float most) co
     const size_t terms = paths_.termCount();
     const Sums zeros(terms);
     const Around around = sumOverRows(
-        gatherer_.receiverCount(), Around{zeros, zeros, DoorSurroundings(paths_, doors_seen_)},
+        gatherer_.receiverCount(),
+        Around{zeros, zeros, std::vector<Spread>(paths_.groupCount()), DoorSurroundings(paths_, doors_seen_)},
         [&](size_t begin, size_t end, Around& sum) {
             for (size_t i = begin; i < end; ++i) sum.doors.addReceiver(i);
             forEachPair(light, begin, end, [&](size_t i, uint32_t t, float direct, float bounced, float stored) {
                 sum.doors.add(i, t, stored);
-                const bool counts = t < paths_.groupCount() ? direct > 0 : seesDoorOf(i, t);
-                if (!counts) return;
+                const bool of_group = t < paths_.groupCount();
+                if (!(of_group ? direct > 0 : seesDoorOf(i, t))) return;
+                const auto lux = static_cast<double>(of_group ? bounced : stored);
                 ++sum.receivers.of[t];
-                sum.lux.of[t] += static_cast<double>(t < paths_.groupCount() ? bounced : stored);
+                sum.lux.of[t] += lux;
+                if (of_group) sum.spread[t].add(lux);
             });
         });
     std::vector<TermReport> reports(terms);
     for (uint32_t t = 0; t < terms; ++t) {
         TermReport& report = reports[t];
         report.measured_over = static_cast<uint64_t>(around.receivers.of[t]);
-        if (report.measured_over > 0) report.mean_lux = static_cast<float>(around.lux.of[t] / around.receivers.of[t]);
+        const double too_much = t < paths_.groupCount() ? around.spread[t].sumAbove(counts_medians_max) : 0;
+        if (report.measured_over > 0)
+            report.mean_lux = static_cast<float>((around.lux.of[t] - too_much) / around.receivers.of[t]);
         const Term& term = paths_.terms()[t];
         if (term.free() && isAlwaysOn(gatherer_.rays().scene(), term.group)) continue;
         const float base = term.free() ? report.mean_lux : doorBase(term, reports[term.group].mean_lux, around.doors);
-        report.threshold_lux = std::min(settings_.thresholdOf(term.group), most) * base;
+        const float share = std::min(settings_.thresholdOf(term.group), most);
+        report.threshold_lux = report.dark_threshold_lux = share * base;
+        if (!term.free() && isAlwaysOn(gatherer_.rays().scene(), term.group)) {
+            report.dark_threshold_lux *= dark_threshold_share;
+            report.share_of_always_on = share * always_on_factor;
+        }
     }
     return reports;
 }
@@ -101,7 +122,7 @@ void Activity::decide(Series& series) const {
         sumOverRows(gatherer_.receiverCount(), Sums(terms), [&](size_t begin, size_t end, Sums& sum) {
             forEachPair(series, begin, end, [&](size_t i, uint32_t t, float direct, float, float stored) {
                 const auto row = active.row(i);
-                bool kept = series.active(t, direct, 0);
+                bool kept = series.active(t, direct, 0, series.alwaysOnLux(i));
                 for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
                     kept = std::ranges::find(row, into, term_of) != row.end();
                 if (!kept) sum.of[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
@@ -132,9 +153,10 @@ SparseLight Activity::activeAround(const Series& series) const {
             else
                 add(i);
             row.clear();
+            const float always_on_lux = series.alwaysOnLux(i);
             for (const uint32_t t : sum.touched()) {
                 const TermLight mean(t, sum[t] / count, rounding);
-                if (series.active(t, 0, luminance(mean.value()))) row.push_back(mean);
+                if (series.active(t, 0, luminance(mean.value()), always_on_lux)) row.push_back(mean);
             }
             sum.clear();
             emit(std::span<const TermLight>(row));
@@ -185,10 +207,22 @@ void Activity::forEachPair(const Series& light, size_t begin, size_t end, auto&&
     }
 }
 
-bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux) {
-    const float threshold = report.threshold_lux;
+float thresholdAt(const TermReport& report, float always_on_lux) {
+    return std::clamp(report.share_of_always_on * always_on_lux, report.dark_threshold_lux, report.threshold_lux);
+}
+
+bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux, float always_on_lux) {
+    const float threshold = thresholdAt(report, always_on_lux);
     return term == always_group || (direct_lux > 0 && direct_lux >= threshold) ||
            (bounced_lux > 0 && bounced_lux >= threshold);
+}
+
+float Series::alwaysOnLux(size_t receiver) const {
+    float lux = 0;
+    for (const auto* part : {&direct, &bounced})
+        for (const TermLight& l : part->row(receiver))
+            if (l.term == always_group) lux += luminance(l.value());
+    return lux;
 }
 
 float Series::keepUpTo(size_t receiver, uint32_t term) const {
@@ -196,16 +230,19 @@ float Series::keepUpTo(size_t receiver, uint32_t term) const {
     for (const auto* part : {&direct, &bounced})
         for (const TermLight& l : part->row(receiver))
             if (l.term == term) brightest = std::max(brightest, luminance(l.value()));
-    const float base = term == always_group ? 0 : threshold_base[term];
+    const TermReport& report = reports[term];
+    float base = term == always_group ? 0 : threshold_base[term];
+    if (report.threshold_lux > 0) base *= thresholdAt(report, alwaysOnLux(receiver)) / report.threshold_lux;
     return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
 }
 
 void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
+    const float always_on_lux = alwaysOnLux(receiver);
     terms.assign(1, always_group);
     for (const TermLight& l : direct.row(receiver))
-        if (l.term != always_group && active(l.term, luminance(l.value()), 0)) terms.push_back(l.term);
+        if (l.term != always_group && active(l.term, luminance(l.value()), 0, always_on_lux)) terms.push_back(l.term);
     for (const TermLight& l : bounced.row(receiver))
-        if (l.term != always_group && active(l.term, 0, luminance(l.value()))) terms.push_back(l.term);
+        if (l.term != always_group && active(l.term, 0, luminance(l.value()), always_on_lux)) terms.push_back(l.term);
     std::ranges::sort(terms);
     terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
 }

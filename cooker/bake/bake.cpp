@@ -10,7 +10,9 @@
 #include <probes/grid_bake.h>
 #include <probes/local_bake.h>
 
+#include <algorithm>
 #include <atomic>
+#include <functional>
 
 namespace dimmer::cook {
 namespace {
@@ -100,16 +102,16 @@ struct FollowedLight {
 };
 
 // Fills `baked` with the light of the groups whose turn it is, as it arrives. `rays`: may be null.
-Series gatherGroups(const Gatherer& gatherer, const BakeSettings& settings, const Turns& turns, Progress& progress,
-                    RememberedRays* rays, Baked& baked) {
+Series gatherGroups(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings, const Turns& turns,
+                    Progress& progress, RememberedRays* rays, Baked& baked) {
     RayEnds* const links = rays ? &rays->links : nullptr;
-    Series series = expandSeries(gatherer, settings, progress, turns.follow, links);
+    Series series = expandSeries(gatherer, lights, settings, progress, turns.follow, links);
     baked.rays = series.rays;
     if (std::ranges::count(turns.bake, 1) > 0) {
-        baked.door_flux = doorFlux(gatherer, series, settings, turns.bake, progress, links);
+        baked.door_flux = doorFlux(gatherer, lights, series, settings, turns.bake, progress, links);
         baked.light =
             gatherAll(gatherer, series, settings, turns.bake, progress, baked.rays, rays ? &rays->gather : nullptr);
-        baked.local_light = bakeLocalGrids(gatherer, series, settings, turns.bake, progress, baked.rays);
+        baked.local_light = bakeLocalGrids(gatherer, lights, series, settings, turns.bake, progress, baked.rays);
     }
     return series;
 }
@@ -223,6 +225,17 @@ class Bake {
         return *gatherer_;
     }
 
+    // Of the groups that are followed or asked for at sites.
+    const LightGrid& lights() {
+        if (!lights_) {
+            gatherer();  // first, or progress would count it to the lamps' rays
+            std::vector<uint8_t> groups = turns_.follow;
+            if (sites_) std::ranges::transform(groups, sites_->asked(), groups.begin(), std::logical_or());
+            lights_.emplace(rays_, settings_.light_grid, groups, &progress_);
+        }
+        return *lights_;
+    }
+
     void followGroups() {
         const bool remembers = store_ && !settings_.per_set_passes;
         RememberedRays rays;
@@ -230,7 +243,8 @@ class Bake {
         const bool fresh_links = rays.links.rows() == 0, fresh_gather = rays.gather.rows() == 0;
         // Only where every receiver is gathered from are there rays from all of them.
         const bool all = turns_.bake[always_group];
-        Series series = gatherGroups(gatherer(), settings_, turns_, progress_, remembers ? &rays : nullptr, baked_);
+        Series series =
+            gatherGroups(gatherer(), lights(), settings_, turns_, progress_, remembers ? &rays : nullptr, baked_);
         if (remembers && fresh_links) store_->keepRays("links", {}, rays.links);
         if (remembers && fresh_gather && all) store_->keepRays("gather", {}, rays.gather);
         rays = {};
@@ -253,7 +267,8 @@ class Bake {
     void makeGrid() {
         if (std::ranges::count(sites_->asked(), 1) > 0) {
             addRadiance(radiance_, paths_, followed_.radiance);
-            baked_.rays += sites_->trace(gatherer(), followed_.radiance, baked_.reports, settings_, progress_);
+            baked_.rays +=
+                sites_->trace(gatherer(), lights(), followed_.radiance, baked_.reports, settings_, progress_);
         }
         followed_ = {};
         auto grid = bakeGrid(rays_, choice_, sites_->take(), paths_.terms(), settings_.grid, progress_);
@@ -287,6 +302,7 @@ class Bake {
     std::optional<SiteLight> sites_;  // of the grid, where it is to be made
     std::optional<EmitterSampler> emitters_;
     std::optional<Gatherer> gatherer_;
+    std::optional<LightGrid> lights_;
     Baked baked_;
 };
 

@@ -159,9 +159,9 @@ std::vector<DoorIndices> doorsNear(const Links& links, const Sparse<uint32_t>& d
     return {all.begin(), all.end()};
 }
 
-std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links,
-                               uint32_t terms_at_once) {
+std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                               const BakeSettings& settings, std::span<const uint8_t> groups, Progress& progress,
+                               RayEnds* links, uint32_t terms_at_once) {
     const Scene& scene = gatherer.rays().scene();
     std::vector<DoorIndices> pairs = series.doors_near;
     std::erase_if(pairs, [&](const DoorIndices& p) { return coveredForAll(scene, p, gatherer.paths().groupCount()); });
@@ -182,7 +182,7 @@ std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, c
         const DoorPaths paths(named, in_sight);
         const Gatherer keeping_pairs(gatherer, paths);
         const std::vector<double> measured =
-            termFlux(keeping_pairs, few(settings, gatherer.texels().size()), progress, groups, links);
+            termFlux(keeping_pairs, lights, few(settings, gatherer.texels().size()), progress, groups, links);
         for (uint32_t t = 0; t < paths.termCount(); ++t) {
             const Term& term = paths.terms()[t];
             const auto doors = doorsOf(term);

@@ -24,12 +24,12 @@ constexpr size_t pairTerms(size_t groups) {
 
 // Per light group; of groups that are not asked for, nothing. `series` is the bake's own. Measured by another of few
 // rays (termFlux) that keeps the pairs of doors near each other; where there are none, it costs nothing.
-// `links`: as expandSeries() has them. `terms_at_once`: pairs are kept in so many terms, the bake's own among them;
-// what does not fit takes another series. (Light that asks for a third door counts for one pair or another, by which
-// pairs are kept together.)
-std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                               std::span<const uint8_t> groups, Progress& progress, RayEnds* links = nullptr,
-                               uint32_t terms_at_once = terms_max);
+// `lights`, `links`: as expandSeries() has them. `terms_at_once`: pairs are kept in so many terms, the bake's own among
+// them; what does not fit takes another series. (Light that asks for a third door counts for one pair or another, by
+// which pairs are kept together.)
+std::vector<DoorFlux> doorFlux(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                               const BakeSettings& settings, std::span<const uint8_t> groups, Progress& progress,
+                               RayEnds* links = nullptr, uint32_t terms_at_once = terms_max);
 
 // The pairs whose loss, over all groups, is above the threshold, the largest first.
 std::vector<DoorPair> dependentDoors(std::span<const DoorFlux> flux, const BakeSettings& settings);

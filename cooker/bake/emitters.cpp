@@ -95,7 +95,7 @@ std::vector<uint32_t> meshGroups(const Scene& scene) {
     return groups;
 }
 
-EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups) {
+EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> mesh_groups, size_t choices_max) {
     const Scene& scene = rays.scene();
     emitter_of_.assign(rays.triangles().size(), UINT32_MAX);
     for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
@@ -115,20 +115,20 @@ EmitterSampler::EmitterSampler(const RayScene& rays, std::span<const uint32_t> m
     }
     std::ranges::stable_sort(emitters_, {}, &Emitter::group);
     if (emitters_.empty()) return;
+    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
     makePatches();
     for (uint32_t i = 0; i < emitters_.size(); ++i) emitter_of_[emitters_[i].triangle] = i;
-    for (uint32_t g = 0; g <= scene.light_sets.size(); ++g) identities_.push_back(groupIdentity(scene, g));
 
     grid_ = {rays.boundsMin(), rays.boundsMax(), emitter_cell_min_m};
     cells_.resize(grid_.count());
-    std::vector<std::span<const Emitter>> groups;
-    for (size_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
-        while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
-        groups.push_back({&emitters_[begin], end - begin});
-    }
-    std::vector<std::vector<uint8_t>> lit(groups.size());
-    tbb::parallel_for(size_t{0}, groups.size(), [&](size_t g) { lit[g] = litCells(rays, groups[g]); });
-    tbb::parallel_for(size_t{0}, cells_.size(), [&](size_t i) { fillCell(i, lit); });
+    std::vector<std::vector<uint8_t>> lit(identities_.size());
+    tbb::parallel_for(size_t{0}, lit.size(), [&](size_t g) {
+        const auto own = std::ranges::equal_range(emitters_, static_cast<uint32_t>(g), {}, &Emitter::group);
+        if (!own.empty()) lit[g] = litCells(rays, {own.begin(), own.end()});
+    });
+    std::atomic<size_t> kept = 0;
+    tbb::parallel_for(size_t{0}, cells_.size(),
+                      [&](size_t i) { fillCell(static_cast<uint32_t>(i), lit, kept, choices_max); });
     leaveFaintGroups();
 }
 
@@ -152,12 +152,16 @@ void EmitterSampler::leaveFaintGroups() {
 
 // One for each emitter of a group, or, where these are many, halves of halves.
 void EmitterSampler::makePatches() {
+    patches_of_group_.resize(identities_.size());
     for (uint32_t begin = 0, end = 0; begin < emitters_.size(); begin = end) {
         while (end < emitters_.size() && emitters_[end].group == emitters_[begin].group) ++end;
+        PatchRange& own = patches_of_group_[emitters_[begin].group];
+        own.begin = static_cast<uint32_t>(patches_.size());
         if (end - begin <= single_max)
             for (uint32_t i = begin; i < end; ++i) addPatch(i, i + 1);
         else
             addHalves(begin, end, patches_max);
+        own.end = static_cast<uint32_t>(patches_.size());
     }
 }
 
@@ -233,34 +237,55 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
     return marks;
 }
 
-void EmitterSampler::fillCell(size_t index, std::span<const std::vector<uint8_t>> lit) {
-    const glm::vec3 centre = grid_.centre(index);
+EmitterSampler::Chances EmitterSampler::chancesAt(uint32_t cell, uint32_t group) const {
+    const glm::vec3 centre = grid_.centre(cell);
     const float radius_m = 0.5f * std::sqrt(3.0f) * grid_.cellSize();
-    const auto groupAt = [&](size_t patch) { return emitters_[patches_[patch].begin].group; };
-    for (size_t begin = 0, end = 0, g = 0; begin < patches_.size(); begin = end, ++g) {
-        while (end < patches_.size() && groupAt(end) == groupAt(begin)) ++end;
-        if (!lit[g][index]) continue;
-        std::vector<Choice> choices;
-        float sum = 0, brightest = 0;
-        for (size_t i = begin; i < end; ++i) {
-            const Patch& p = patches_[i];
-            brightest = std::max(brightest, p.brightest);
-            const glm::vec3 to_centre = centre - p.centre;
-            const float near2 = radius_m * radius_m + p.area_m2;
-            const float weight =
-                p.power * facing(p, to_centre, radius_m) / std::max(glm::dot(to_centre, to_centre), near2);
-            if (!(weight > 0)) continue;
-            choices.push_back({static_cast<uint32_t>(i), weight});
-            sum += weight;
-        }
-        if (!(sum > 0)) continue;
-        leaveFaintest(choices, left_share_max * sum);
-        makeCumulative(choices);
-        choices.shrink_to_fit();
-        const uint32_t group = groupAt(begin);
-        cells_[index].push_back(
-            {group, identities_[group], sum, sum > coverage_min * pi * brightest, std::move(choices)});
+    Chances out;
+    float brightest = 0;
+    for (uint32_t i = patches_of_group_[group].begin; i < patches_of_group_[group].end; ++i) {
+        const Patch& p = patches_[i];
+        brightest = std::max(brightest, p.brightest);
+        const glm::vec3 to_centre = centre - p.centre;
+        const float near2 = radius_m * radius_m + p.area_m2;
+        const float weight = p.power * facing(p, to_centre, radius_m) / std::max(glm::dot(to_centre, to_centre), near2);
+        if (!(weight > 0)) continue;
+        out.choices.push_back({i, weight});
+        out.light += weight;
     }
+    out.wide = out.light > coverage_min * pi * brightest;
+    if (!(out.light > 0)) return {};
+    leaveFaintest(out.choices, left_share_max * out.light);
+    makeCumulative(out.choices);
+    return out;
+}
+
+void EmitterSampler::fillCell(uint32_t cell, std::span<const std::vector<uint8_t>> lit, std::atomic<size_t>& kept,
+                              size_t choices_max) {
+    for (uint32_t g = 0; g < lit.size(); ++g) {
+        if (lit[g].empty() || !lit[g][cell]) continue;
+        Chances chances = chancesAt(cell, g);
+        if (chances.choices.empty()) continue;
+        // Which of them are kept changes nothing but time.
+        if (kept.fetch_add(chances.choices.size()) + chances.choices.size() > choices_max) chances.choices = {};
+        chances.choices.shrink_to_fit();
+        cells_[cell].push_back({g, identities_[g], chances.light, chances.wide, cell, std::move(chances.choices)});
+    }
+}
+
+std::span<const EmitterSampler::Choice> EmitterSampler::choicesOf(const CellGroup& from) const {
+    if (!from.choices.empty()) return from.choices;
+    auto& slots = recent_.local().slots;
+    auto& slot = slots[hash(from.cell, from.identity) % slots.size()];
+    if (slot.cell != from.cell || slot.group != from.group)
+        slot = {from.cell, from.group, chancesAt(from.cell, from.group).choices};
+    return slot.choices;
+}
+
+size_t EmitterSampler::keptChoices() const {
+    size_t sum = 0;
+    for (const Cell& cell : cells_)
+        for (const CellGroup& group : cell) sum += group.choices.size();
+    return sum;
 }
 
 std::span<const EmitterSampler::CellGroup> EmitterSampler::groups(uint32_t cell) const {
@@ -275,7 +300,7 @@ float EmitterSampler::chanceWithin(uint32_t emitter) const {
 }
 
 EmitterSample EmitterSampler::sample(const CellGroup& from, glm::vec3 point, float choice, glm::vec2 u) const {
-    const std::span<const Choice> choices = from.choices;
+    const std::span<const Choice> choices = choicesOf(from);
     auto it = std::ranges::upper_bound(choices, choice, {}, &Choice::cumulative);
     if (it == choices.end()) --it;
     const auto index = static_cast<size_t>(it - choices.begin());
@@ -312,7 +337,7 @@ float EmitterSampler::pdf(uint32_t cell, const Emitter& emitter, float distance_
     for (const CellGroup& from : groups(cell)) {
         if (from.group != emitter.group) continue;
         const uint32_t patch = patch_of_emitter_[index];
-        const std::span<const Choice> choices = from.choices;
+        const std::span<const Choice> choices = choicesOf(from);
         const auto it = std::ranges::lower_bound(choices, patch, {}, &Choice::patch);
         if (it == choices.end() || it->patch != patch) return 0;
         return probability(choices, static_cast<size_t>(it - choices.begin())) * chanceWithin(index) * distance_m *

@@ -136,7 +136,7 @@ struct DoorAims {
 inline constexpr uint32_t no_face = UINT32_MAX;
 
 // Texels from half a cell of the grid of lights on: their points lie in several.
-inline constexpr float wide_texel_m2 = 0.25f * LightGrid::cell_min_m * LightGrid::cell_min_m;
+inline constexpr float wide_texel_m2 = 0.25f * LightGrid::cell_m * LightGrid::cell_m;
 
 // Where a gather starts: points that share its rays evenly, and what seeds its sample sequence.
 struct GatherFrom {

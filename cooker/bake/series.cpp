@@ -45,13 +45,13 @@ constexpr size_t links_ahead = 8;
 
 class Expansion {
    public:
-    Expansion(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+    Expansion(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings, Progress& progress,
               std::span<const uint8_t> groups, RayEnds* ends, std::string_view what_for = "")
         : gatherer_(gatherer),
           receivers_(gatherer.receiverCount()),
           settings_(settings),
           progress_(progress),
-          grid_(gatherer.rays(), settings.light_grid, groups, &progress),
+          lights_(lights.ofGroups(groups)),
           paths_(gatherer.paths()),
           terms_(paths_.termCount()),
           ends_(ends),
@@ -131,7 +131,7 @@ class Expansion {
                 own_options.row = ends.ends.size() < options.rays ? nullptr : &ends;
                 const Rounding rounding(i, Rounding::Of::Direct);
                 const GatherFrom from = gatherer_.at(i, points);
-                traced += directLight(gatherer_, grid_, from, sum, full, light_points) + options.rays;
+                traced += directLight(gatherer_, lights_, from, sum, full, light_points) + options.rays;
                 left_row.clear();
                 for (uint32_t t : sum.touched()) {
                     const glm::vec3 left = sum[t].irradiance_lux - full[t].irradiance_lux;
@@ -409,7 +409,7 @@ class Expansion {
     size_t receivers_;  // texels, then those of models
     const BakeSettings& settings_;
     Progress& progress_;
-    LightGrid grid_;
+    LightGrid lights_;
     const DoorPaths& paths_;
     uint32_t terms_;
     RayEnds* ends_;  // may be null
@@ -426,14 +426,14 @@ class Expansion {
 
 }  // namespace
 
-Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+Series expandSeries(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups, RayEnds* links) {
-    return Expansion(gatherer, settings, progress, groups, links).run();
+    return Expansion(gatherer, lights, settings, progress, groups, links).run();
 }
 
-std::vector<double> termFlux(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-                             std::span<const uint8_t> groups, RayEnds* links) {
-    return Expansion(gatherer, settings, progress, groups, links, " for pairs of doors").flux();
+std::vector<double> termFlux(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings,
+                             Progress& progress, std::span<const uint8_t> groups, RayEnds* links) {
+    return Expansion(gatherer, lights, settings, progress, groups, links, " for pairs of doors").flux();
 }
 
 }  // namespace dimmer::cook

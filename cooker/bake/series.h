@@ -3,6 +3,7 @@
 #pragma once
 
 #include <bake/bake.h>
+#include <bake/light_grid.h>
 
 #include <string>
 #include <vector>
@@ -11,7 +12,8 @@ namespace dimmer::cook {
 
 // Whether light is stored of a term: always-on light over free paths is. Lit directly counts once it matters as much as
 // the threshold asks of indirect light: a lamp without range lights everything in sight a little.
-bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux);
+// `always_on_lux`: what is there of always-on light with all doors closed.
+bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux, float always_on_lux);
 
 struct Series {
     SparseLight direct;                   // irradiance from punctual lights, emitters and the sky, lux
@@ -26,9 +28,10 @@ struct Series {
     std::vector<uint32_t> bounces;        // per light group
     uint64_t rays = 0;
 
-    bool active(uint32_t term, float direct_lux, float bounced_lux) const {
-        return isActive(reports[term], term, direct_lux, bounced_lux);
+    bool active(uint32_t term, float direct_lux, float bounced_lux, float always_on_lux) const {
+        return isActive(reports[term], term, direct_lux, bounced_lux, always_on_lux);
     }
+    float alwaysOnLux(size_t receiver) const;
     // The largest threshold (BakeSettings) at which the term stays active at the receiver.
     float keepUpTo(size_t receiver, uint32_t term) const;
     // Ascending: always-on light over free paths, then what is active at the receiver.
@@ -37,13 +40,13 @@ struct Series {
 
 // Deterministic for any number of threads, and each light group's part is the same whichever others there are
 // (combinations of doors, though, are the level's: see DoorPaths).
-// Memory while it runs: series_rays receivers' numbers per texel, 2 to 3 bytes each. `groups`: per light group, whether
-// to follow its light; empty: all. `links`: where the rays end, where that is known, to be filled in where it is empty;
-// at least series_rays each.
-Series expandSeries(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
+// Memory while it runs: series_rays receivers' numbers per texel, 2 to 3 bytes each. `lights`: of the level; may have
+// more groups than are asked for. `groups`: per light group, whether to follow its light; empty: all. `links`: where
+// the rays end, where that is known, to be filled in where it is empty; at least series_rays each.
+Series expandSeries(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings, Progress& progress,
                     std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
 // Only what arrives of each term, as TermReport::energy has it, lm. Rougher: of each texel one point sees each lamp.
-std::vector<double> termFlux(const Gatherer& gatherer, const BakeSettings& settings, Progress& progress,
-                             std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
+std::vector<double> termFlux(const Gatherer& gatherer, const LightGrid& lights, const BakeSettings& settings,
+                             Progress& progress, std::span<const uint8_t> groups = {}, RayEnds* links = nullptr);
 
 }  // namespace dimmer::cook

@@ -85,12 +85,8 @@ class FileUnwrap {
           faces_(faces),
           mesh_(rays.scene().meshes[rays.triangles()[faces[ids[0]].triangle].mesh]),
           usable_(static_cast<float>(side_max - 2 * padding_texels) - 1) {
-        double area_m2 = 0, area_uv = 0;
         std::vector<uint32_t> triangles;
         for (uint32_t id : ids) {
-            const auto c = corners(rays, faces[id]);
-            area_m2 += 0.5 * glm::length(glm::cross(c[1] - c[0], c[2] - c[0]));
-            area_uv += 0.5 * std::abs(cross2d(uvOf(id, 1) - uvOf(id, 0), uvOf(id, 2) - uvOf(id, 0)));
             add(whole_, id);
             triangles.push_back(triangleOf(id));
         }
@@ -98,7 +94,7 @@ class FileUnwrap {
             FileUvs& part = pieces_.emplace_back();
             for (const uint32_t i : piece) add(part, ids[i]);
         }
-        scale_ = density * static_cast<float>(std::sqrt(area_m2 / area_uv));
+        scale_ = density * static_cast<float>(metresPerUnit(density));
     }
 
     // Piece by piece where that takes fewer texels, as those of a mesh may lie anywhere in an atlas of many, or where
@@ -123,6 +119,23 @@ class FileUnwrap {
    private:
     uint32_t triangleOf(uint32_t id) const { return rays_.triangles()[faces_[id].triangle].triangle; }
     glm::vec2 uvOf(uint32_t id, int i) const { return mesh_.uv1[mesh_.triangles[triangleOf(id)][i]]; }
+    // The side of a square of the mesh over that of its unwrap, by area. What is narrower than a texel was widened: of
+    // that, its length counts.
+    double metresPerUnit(float density) const {
+        double area_m2 = 0, area_uv = 0;
+        for (const FileUvs& piece : pieces_)
+            for (const uint32_t id : piece.ids) {
+                const auto p = corners(rays_, faces_[id]);
+                const std::array<glm::vec2, 3> uv = {uvOf(id, 0), uvOf(id, 1), uvOf(id, 2)};
+                const double m2 = 0.5 * double{glm::length(glm::cross(p[1] - p[0], p[2] - p[0]))};
+                const UnwrapScale scale = unwrapScale(uv, p);
+                const bool narrow = isNarrow(scale, piece.high - piece.low, density);
+                area_m2 += m2;
+                area_uv += narrow ? m2 / (scale.long_m * scale.long_m)
+                                  : 0.5 * std::abs(double{cross2d(uv[1] - uv[0], uv[2] - uv[0])});
+            }
+        return std::sqrt(area_m2 / area_uv);
+    }
     static float extentOf(const FileUvs& part) { return std::max(part.high.x - part.low.x, part.high.y - part.low.y); }
     float scaleOf(const FileUvs& part) const { return std::min(scale_, usable_ / extentOf(part)); }
 
@@ -309,11 +322,14 @@ Expected<Unwrap> unwrap(const RayScene& rays, const UnwrapOptions& options) {
     const std::vector<Placed> charts = makeCharts(rays, options, out);
     std::vector<glm::uvec2> sizes;
     for (const Placed& c : charts) sizes.emplace_back(c.width, c.height);
+    const glm::vec3 size = rays.boundsMax() - rays.boundsMin();
     if (!packPages(sizes, options.page_size, out))
-        return fail(ErrorCode::BadInput,
-                    fmt::format("{}: the lightmap needs more than 256 pages of {} x {} texels; lower "
-                                "lightmaps.texels_per_metre or raise lightmaps.page_size",
-                                rays.scene().file, options.page_size, options.page_size));
+        return fail(
+            ErrorCode::BadInput,
+            fmt::format("{}: is {:.0f} x {:.0f} x {:.0f} m large, and its lightmap needs more than 256 pages of "
+                        "{} x {} texels; is it in metres, as glTF has it? If so, lower "
+                        "lightmaps.texels_per_metre or raise lightmaps.page_size",
+                        rays.scene().file, size.x, size.y, size.z, options.page_size, options.page_size));
 
     const size_t count = out.faces.size();
     out.uv_texels.resize(count);

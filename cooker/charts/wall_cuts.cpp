@@ -221,7 +221,7 @@ class WallCutter {
 }  // namespace
 
 void cutAtWalls(Scene& scene, float texels_per_metre, uint32_t page_size) {
-    dropInvalidUnwraps(scene);
+    dropInvalidUnwraps(scene, texels_per_metre);
     WallCutter(scene, texels_per_metre, page_size).run();
 }
 

@@ -82,6 +82,12 @@ float widthM(const SceneMesh& mesh) {
 
 std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {
     const Scene& scene = rays.scene();
+    constexpr float least_level_m = 1.5f;
+    const glm::vec3 size = rays.boundsMax() - rays.boundsMin();
+    if (std::max({size.x, size.y, size.z}) < least_level_m)
+        return fmt::format(
+            "{}: is {:.2f} x {:.2f} x {:.2f} m large, smaller than a person: is the level in metres, as glTF has it?",
+            scene.file, size.x, size.y, size.z);
     constexpr uint32_t padding = 1, few_texels = 3;
     std::vector<float> widths_m;  // of meshes: of ground in fine triangles charts are narrow, and it is not
     for (const SceneMesh& mesh : scene.meshes) widths_m.push_back(widthM(mesh));
@@ -109,7 +115,8 @@ std::optional<std::string> tooLargeForTexels(const RayScene& rays, const Unwrap&
         const uint32_t t = unwrap.faces[f].triangle;
         const glm::vec3 a = rays.corner(t, 0);
         const float area_m2 = glm::length(glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a)) / 2;
-        texels += static_cast<double>(area_m2 / unwrap.texel_area_m2[f]);
+        // A sliver may have no area left on its page.
+        if (unwrap.texel_area_m2[f] > 0) texels += static_cast<double>(area_m2 / unwrap.texel_area_m2[f]);
     }
     const auto faces = static_cast<double>(unwrap.faces.size());
     if (texels < texels_min || texels < texels_per_face * faces) return {};

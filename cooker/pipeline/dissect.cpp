@@ -60,7 +60,8 @@ Expected<std::unique_ptr<Rebake>> rebake(Scene scene, const Pack& pack, Progress
     bake->paths.emplace(level.scene, doorsInSight(*level.rays));
     bake->gatherer.emplace(*level.rays, level.charts, bake->texels, *bake->emitters, *bake->paths);
     bake->taps.emplace(level.charts, bake->texels);
-    bake->series = expandSeries(*bake->gatherer, bake->settings, progress);
+    const LightGrid lights(*level.rays, bake->settings.light_grid, {}, &progress);
+    bake->series = expandSeries(*bake->gatherer, lights, bake->settings, progress);
     return bake;
 }
 

@@ -64,11 +64,11 @@ Remedy byAll(const PackData& pack, const PackCost& cost, const Profile& profile,
     return best;
 }
 
-// Probes give the share that is asked of all, and density what it can.
+// Probes give the share that is asked of all, or as many as can go, and density what it can.
 Remedy byShares(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                 size_t density_steps) {
     if (profile.budget_total == 0 || cost.device() <= profile.budget_total) return {};
-    const double left = ratio(profile.budget_total, cost.device());
+    const double left = std::max(ratio(profile.budget_total, cost.device()), leastProbesLeft(pack));
     const Remedy probes = toProbes(pack, cost, profile, losses, left);
     if (probes.changes.empty()) return {};
     const PackCost rest = withProbesLeft(cost, left);

@@ -4,6 +4,7 @@ namespace dimmer::cook {
 namespace {
 
 constexpr double probes_margin = 0.97;      // tetrahedra go almost with probes
+constexpr uint64_t corners = 8;             // of the grid's box, which are probes too
 constexpr uint32_t local_probes_least = 8;  // a gradient along each axis
 
 }  // namespace
@@ -21,10 +22,14 @@ PackCost withProbesLeft(PackCost cost, double left) {
     return cost;
 }
 
+double leastProbesLeft(const PackData& pack) {
+    const auto probes = static_cast<double>(std::max<size_t>(1, pack.probes.global.positions.size()));
+    return std::min(1.0, (static_cast<double>(corners) + 1.01) / (probes_margin * probes));
+}
+
 Remedy toProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                 double left) {
     Remedy remedy;
-    constexpr uint64_t corners = 8;  // of the grid's box, which are probes too
     const uint64_t probes = pack.probes.global.positions.size();
     if (!(left < 1) || probes <= corners) return remedy;
     const auto to = static_cast<uint64_t>(probes_margin * std::max(left, 0.0) * static_cast<double>(probes));

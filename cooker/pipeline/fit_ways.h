@@ -48,6 +48,8 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
 
 // What a share of the probes of the global grid would cost.
 PackCost withProbesLeft(PackCost cost, double left);
+// The least share that toProbes() can go to; 1 where none may go.
+double leastProbesLeft(const PackData& pack);
 // Fewer probes, as bytes go with their number: `left` of them, a share, or a little less.
 Remedy toProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses,
                 double left);

@@ -69,10 +69,12 @@ std::vector<std::vector<uint32_t>> sitesOfProbes(const Placement& placed) {
 // One term over the probes that have it and the sites where they count.
 class TermFit {
    public:
+    // `all_over`: per site, whether it is one of those that are drawn evenly from all air.
     TermFit(const Placement& placed, const std::vector<std::vector<uint32_t>>& sites_of_probes,
-            std::span<const SiteTerm> light)
+            std::span<const uint8_t> all_over, std::span<const SiteTerm> light)
         : placed_(placed),
           sites_of_probes_(sites_of_probes),
+          all_over_(all_over),
           light_(light),
           number_(placed.place_of.size(), not_a_member) {}
 
@@ -137,6 +139,7 @@ class TermFit {
             targets_.push_back(is_lit ? valueOf(lit->light->light) : FitValue{});
             variances_.push_back(is_lit ? lit->light->variance : 0);
             sites_.push_back(site);
+            evenly_drawn_.push_back(all_over_[s]);
         }
     }
 
@@ -144,13 +147,21 @@ class TermFit {
     static constexpr float lux_of_brightness = 0.886227f;  // sqrt(pi) / 2
     static float brightness(const FitValue& light) { return std::max(0.0f, luminance({light[0], light[1], light[2]})); }
 
-    // Darker places count no more.
+    // Darker places count no more. Half of the places are around lamps, those of one whose direct light is baked up to
+    // thousands of times as bright as its room: they count for no more than that again, as in placement. By their mean
+    // all of the room was as dark as could be, and probes beside the lamp fitted what lies centimetres off it alone.
     float floorOfLight() const {
         constexpr float floor_of_mean = 0.1f;
-        double sum = 0;
-        for (const FitValue& target : targets_) sum += static_cast<double>(brightness(target));
-        return floor_of_mean * static_cast<float>(sum / static_cast<double>(std::max<size_t>(1, targets_.size()))) +
-               1e-12f;
+        double sum = 0, evenly_drawn_sum = 0;
+        size_t evenly_drawn = 0;
+        for (size_t s = 0; s < targets_.size(); ++s) {
+            const auto light = static_cast<double>(brightness(targets_[s]));
+            sum += light;
+            if (evenly_drawn_[s]) evenly_drawn_sum += light, ++evenly_drawn;
+        }
+        double mean = sum / static_cast<double>(std::max<size_t>(1, targets_.size()));
+        if (evenly_drawn_sum > 0) mean = std::min(mean, 2 * evenly_drawn_sum / static_cast<double>(evenly_drawn));
+        return floor_of_mean * static_cast<float>(mean) + 1e-12f;
     }
 
     // Between absolute errors and shares, as placement has it, and closer to shares, as lamps' light is known to be
@@ -177,9 +188,11 @@ class TermFit {
 
     const Placement& placed_;
     const std::vector<std::vector<uint32_t>>& sites_of_probes_;
+    std::span<const uint8_t> all_over_;
     std::span<const SiteTerm> light_;
     std::vector<uint32_t> number_;  // per position, among the probes of the term
     std::vector<FitSite> sites_;
+    std::vector<uint8_t> evenly_drawn_;  // per one of these
     std::vector<FitValue> targets_;
     std::vector<float> variances_;  // of the targets' irradiance, lux^2
 };
@@ -190,7 +203,8 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
                              std::span<const Term> terms, const GridSettings& settings, Progress& progress) {
     BakedGrid out;
     out.free_volume_m3 = choice.free_volume_m3;
-    const std::vector<FitValue> states = statesOf(rays.scene(), light, terms, siteOrder(choice.blocks));
+    const std::vector<SiteRow> order = siteOrder(choice.blocks);
+    const std::vector<FitValue> states = statesOf(rays.scene(), light, terms, order);
     auto placed = placeProbes(rays, choice, states, settings, progress);
     if (!placed) return std::unexpected(placed.error());
     progress.stage("probes", terms.size());
@@ -202,8 +216,10 @@ Expected<BakedGrid> bakeGrid(const RayScene& rays, const SiteChoice& choice, con
         const auto members =
             byTerm<ProbeTermLight>(rows.size(), terms.size(), [&](uint32_t i) { return std::span(rows[i]); });
         const auto sites_of_probes = sitesOfProbes(*placed);
+        std::vector<uint8_t> all_over;
+        for (const SiteRow& site : order) all_over.push_back(site.block == 0);
         tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) {
-            TermFit(*placed, sites_of_probes, sites[t]).fit(members[t]);
+            TermFit(*placed, sites_of_probes, all_over, sites[t]).fit(members[t]);
             progress.advance(1);
         });
     }

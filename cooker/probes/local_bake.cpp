@@ -64,10 +64,15 @@ std::vector<std::vector<ProbeTermLight>> fitTerms(const Series& series, const Mo
     std::vector<std::vector<ProbeLight>> light(terms.size());
     tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) { light[t] = fitted(model, terms[t]); });
     std::vector<std::vector<ProbeTermLight>> rows(model.at_probes.size());
-    for (size_t i = 0; i < rows.size(); ++i)
-        for (size_t t = 0; t < terms.size(); ++t)
-            if (terms[t] == always_group || series.active(terms[t], 0, luminance(light[t][i].irradiance())))
+    for (size_t i = 0; i < rows.size(); ++i) {
+        float always_on_lux = 0;  // the first of the terms
+        for (size_t t = 0; t < terms.size(); ++t) {
+            const float lux = luminance(light[t][i].irradiance());
+            if (terms[t] == always_group) always_on_lux = lux;
+            if (terms[t] == always_group || series.active(terms[t], 0, lux, always_on_lux))
                 rows[i].push_back({terms[t], light[t][i], 0, 0});
+        }
+    }
     return rows;
 }
 
@@ -79,14 +84,14 @@ std::vector<ModelPlace> placesOf(const RayScene& rays, uint32_t model, size_t pr
 
 class LocalBake {
    public:
-    LocalBake(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
+    LocalBake(const Gatherer& gatherer, const LightGrid& lights, const Series& series, const BakeSettings& settings,
               std::span<const uint8_t> groups, Progress& progress)
         : gatherer_(gatherer),
           series_(series),
           settings_(settings),
           groups_(groups),
           progress_(progress),
-          lights_(gatherer.rays(), settings.light_grid, groups, &progress) {
+          lights_(lights.ofGroups(groups)) {
         const auto& models = gatherer.rays().scene().models;
         for (uint32_t m = 0; m < models.size(); ++m) {
             if (models[m].moves) continue;
@@ -172,11 +177,12 @@ class LocalBake {
 
 }  // namespace
 
-Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                      std::span<const uint8_t> groups, Progress& progress, uint64_t& rays) {
+Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                                      const BakeSettings& settings, std::span<const uint8_t> groups, Progress& progress,
+                                      uint64_t& rays) {
     std::vector<std::vector<ProbeTermLight>> rows;
     if (!gatherer.models().empty()) {
-        LocalBake bake(gatherer, series, settings, groups, progress);
+        LocalBake bake(gatherer, lights, series, settings, groups, progress);
         rows = bake.run();
         rays += bake.rays();
     }

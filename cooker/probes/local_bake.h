@@ -11,8 +11,9 @@ namespace dimmer::cook {
 // transfers (findTransfers) and at most fitted_probes_max probes. Adds the rays to `rays`. Each group's part is the
 // same whichever others there are.
 inline constexpr uint32_t fitted_probes_max = 128;
-Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const Series& series, const BakeSettings& settings,
-                                      std::span<const uint8_t> groups, Progress& progress, uint64_t& rays);
+Sparse<ProbeTermLight> bakeLocalGrids(const Gatherer& gatherer, const LightGrid& lights, const Series& series,
+                                      const BakeSettings& settings, std::span<const uint8_t> groups, Progress& progress,
+                                      uint64_t& rays);
 // What is wrong with standing models' grids: by the geometry alone, so that a cook whose light is all cached says it
 // too. `places`: of the same rays.
 std::vector<std::string> warningsOfLocalGrids(const RayScene& rays, const ProbePlaces& places);

@@ -63,10 +63,14 @@ uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from) {
         if (luminance(sum_[t].irradiance()) > 0) bounced_.push_back(t);
     std::ranges::sort(bounced_);
     active_.assign(1, always_group);
+    float always_on_lux = 0;
+    for (auto* light : {&direct_, &sum_})
+        if (!light->touched().empty() && light->touched()[0] == always_group)
+            always_on_lux += luminance((*light)[always_group].irradiance());
     for (auto* light : {&direct_, &sum_}) {
         for (const uint32_t t : light->touched()) {
             const float lux = luminance((*light)[t].irradiance());
-            if (t != always_group && series_.active(t, 0, lux)) active_.push_back(t);
+            if (t != always_group && series_.active(t, 0, lux, always_on_lux)) active_.push_back(t);
         }
         light->clear();
     }

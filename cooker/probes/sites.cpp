@@ -69,6 +69,7 @@ class PlaceTrace {
         for (const uint32_t t : direct_.touched())
             if (sum_.wants(t)) sum_[t];
         row.reserve(sum_.touched().size());
+        float always_on_lux = 0;  // the first term, of those that ascend
         for (const uint32_t t : sum_.touched()) {
             if (!sum_.wants(t)) continue;
             ProbeLight light = sum_[t] * 0.5f;  // of two halves
@@ -76,8 +77,9 @@ class PlaceTrace {
             first_half_lux_[t] = 0;
             light += full_[t];
             const float lux = luminance(light.irradiance());
-            if (isActive(reports_[t], t, luminance(direct_[t].irradiance()), lux))
-                row.push_back({t, light, off * off, 0});
+            const float direct_lux = luminance(direct_[t].irradiance());
+            if (t == always_group) always_on_lux = lux + direct_lux;
+            if (isActive(reports_[t], t, direct_lux, lux, always_on_lux)) row.push_back({t, light, off * off, 0});
         }
         sum_.clear();
         direct_.clear();
@@ -242,11 +244,11 @@ Sparse<ProbeTermLight> SiteLight::ofGroup(std::span<const Row> rows, uint32_t gr
     });
 }
 
-uint64_t SiteLight::trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
-                          const BakeSettings& settings, Progress& progress) {
+uint64_t SiteLight::trace(const Gatherer& gatherer, const LightGrid& level_lights, const SparseLight& radiance,
+                          std::span<const TermReport> reports, const BakeSettings& settings, Progress& progress) {
     const auto asked_groups = asked();
     if (std::ranges::count(asked_groups, 1) == 0) return 0;
-    const LightGrid lights(gatherer.rays(), settings.light_grid, asked_groups, &progress);
+    const LightGrid lights = level_lights.ofGroups(asked_groups);
     // Blocks that miss the same groups are traced together: most often all of them.
     std::map<std::vector<uint32_t>, std::vector<size_t>> passes;
     for (size_t b = 0; b < blocks_.size(); ++b)

@@ -22,10 +22,10 @@ class SiteLight {
 
     // Per group: whether something of its light is to be traced.
     std::vector<uint8_t> asked() const;
-    // Traces that; `radiance` and `reports` have what the asked groups need. Keeps it in the store. From as many rays
-    // as the noise needs to be small beside what interpolation misses. Returns the rays traced.
-    uint64_t trace(const Gatherer& gatherer, const SparseLight& radiance, std::span<const TermReport> reports,
-                   const BakeSettings& settings, Progress& progress);
+    // Traces that; `lights`, `radiance` and `reports` have what the asked groups need. Keeps it in the store. From as
+    // many rays as the noise needs to be small beside what interpolation misses. Returns the rays traced.
+    uint64_t trace(const Gatherer& gatherer, const LightGrid& lights, const SparseLight& radiance,
+                   std::span<const TermReport> reports, const BakeSettings& settings, Progress& progress);
     // Per place in siteOrder(), ascending, what is active there. Empties this.
     Sparse<ProbeTermLight> take();
 

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 #include <scene/extras.h>
+#include <update/state_text.h>
 
 #include <algorithm>
 #include <array>
@@ -17,22 +18,6 @@ constexpr std::array<std::string_view, 5> scene_keys = {"dimmer_sky_color", "dim
 
 bool contains(std::span<const std::string_view> keys, std::string_view key) {
     return std::ranges::count(keys, key) > 0;
-}
-
-// Levenshtein distance, one row at a time.
-size_t editDistance(std::string_view a, std::string_view b) {
-    std::vector<size_t> row(b.size() + 1);
-    for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
-    for (size_t i = 1; i <= a.size(); ++i) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= b.size(); ++j) {
-            const size_t replaced = diagonal + (a[i - 1] != b[j - 1]);
-            diagonal = row[j];
-            row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
-        }
-    }
-    return row[b.size()];
 }
 
 std::string_view nearest(std::string_view key) {

@@ -5,6 +5,7 @@
 #include <scene/gltf_check.h>
 #include <scene/gltf_file.h>
 #include <scene/ies_light.h>
+#include <scene/leftovers.h>
 #include <scene/light.h>
 #include <scene/material.h>
 #include <scene/mesh.h>
@@ -323,6 +324,9 @@ class LevelImporter {
             place(at, *settings, group.light_set, std::move(*mesh));
         }
         if (!any) context_.warn(owner, "its mesh has no triangles and was ignored.");
+        if (any && settings->lighting == Lighting::Automatic)
+            leftovers_.consider(node.name.empty() ? model_.meshes[static_cast<size_t>(node.mesh)].name : node.name,
+                                owner);
         return {};
     }
 
@@ -427,6 +431,7 @@ class LevelImporter {
     Expected<void> conclude() {
         if (const auto ok = elements_.checkDoors(); !ok) return ok;
         if (const auto ok = checkOpenPoses(context_); !ok) return ok;
+        leftovers_.warn(context_);
         Extras extras(context_);
         extras.add(sceneExtras(), "scene");
         if (const auto ok = elements_.combinations(extras); !ok) return ok;
@@ -443,6 +448,7 @@ class LevelImporter {
     Scene scene_;
     ImportContext context_{model_, scene_};
     Elements elements_{context_};
+    Leftovers leftovers_;
     LightProfiles profiles_{context_};
     std::vector<PlacedNode> placed_;
     std::optional<MeshImporter> meshes_;

@@ -73,7 +73,9 @@ char lowerCase(char c) {
     return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
 }
 
-// Levenshtein's distance, one row at a time; capitals are no difference.
+}  // namespace
+
+// One row at a time.
 size_t editDistance(std::string_view a, std::string_view b) {
     std::vector<size_t> row(b.size() + 1);
     for (size_t j = 0; j < row.size(); ++j) row[j] = j;
@@ -88,8 +90,6 @@ size_t editDistance(std::string_view a, std::string_view b) {
     }
     return row.back();
 }
-
-}  // namespace
 
 Expected<std::vector<StateAssignment>> parseState(std::string_view text) {
     std::vector<StateAssignment> assignments;

@@ -18,6 +18,9 @@ struct StateAssignment {
 // Syntax only: names and ranges are the caller's to check. An empty text is no assignment.
 Expected<std::vector<StateAssignment>> parseState(std::string_view text);
 
+// Levenshtein's distance; capitals are no difference.
+size_t editDistance(std::string_view a, std::string_view b);
+
 // The name among `names` that was most likely meant, or empty when none is close.
 std::string_view nearestName(std::string_view name, const std::vector<std::string_view>& names);
 

@@ -251,7 +251,7 @@ TEST_F(Commands, BenchJson) {
         expectKeys(c, {"name", "mode", "receivers", "batches", "dispatches", "bytes", "gpu_us", "host_us", "roof_us",
                        "efficiency"});
         expectKeys(c["host_us"], {"min", "median", "max"});
-        expectKeys(c["gpu_us"], {"min", "median", "max"});
+        EXPECT_TRUE(c["gpu_us"].is_null());
         names.push_back(c["name"]);
     }
     EXPECT_THAT(names, testing::IsSupersetOf({"nothing changed", "set one toggled", "set both toggled",

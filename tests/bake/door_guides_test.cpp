@@ -71,7 +71,8 @@ void expectLessNoise(const Scene& scene, const glm::mat3& turned, double gain_mi
     const EmitterSampler emitters(*b.rays, meshGroups(b.scene));
     const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
     SilentProgress silent;
-    const Series series = expandSeries(gatherer, {.series_rays = 128, .final_rays = 0, .threshold = 0}, silent);
+    const Series series =
+        expandSeries(gatherer, LightGrid(*b.rays), {.series_rays = 128, .final_rays = 0, .threshold = 0}, silent);
     const uint32_t through = paths.term(1, paths.with(free_path, 1));
     const std::vector<float> floors(paths.termCount());
 

@@ -77,10 +77,10 @@ TEST(DoorPairs, AreMeasuredTheSameOneByOne) {
     const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
     const BakeSettings settings{.series_rays = 32, .final_rays = 1};
     SilentProgress quiet;
-    const Series series = expandSeries(gatherer, settings, quiet);
+    const Series series = expandSeries(gatherer, LightGrid(*b.rays), settings, quiet);
     const std::vector<uint8_t> all(paths.groupCount(), 1);
-    const auto together = doorFlux(gatherer, series, settings, all, quiet),
-               one_by_one = doorFlux(gatherer, series, settings, all, quiet, nullptr, 0);
+    const auto together = doorFlux(gatherer, LightGrid(*b.rays), series, settings, all, quiet),
+               one_by_one = doorFlux(gatherer, LightGrid(*b.rays), series, settings, all, quiet, nullptr, 0);
     size_t compared = 0;
     ASSERT_EQ(together.size(), one_by_one.size());
     for (size_t g = 0; g < together.size(); ++g) {
@@ -150,7 +150,7 @@ TEST(DoorPairs, AreFoundAroundTwoBends) {
     const DoorPaths paths(scene, doorsInSight(*b.rays));
     const Gatherer gatherer(*b.rays, b.charts, b.texels, emitters, paths);
     SilentProgress quiet;
-    const Series series = expandSeries(gatherer, {.series_rays = 32, .final_rays = 1}, quiet);
+    const Series series = expandSeries(gatherer, LightGrid(*b.rays), {.series_rays = 32, .final_rays = 1}, quiet);
     for (size_t i = 0; i < series.doors_seen.rows(); ++i) ASSERT_LT(series.doors_seen.row(i).size(), 2u);
     b.bake({.series_rays = 32, .final_rays = 1});
     ASSERT_EQ(b.baked.dependent_doors.size(), 1u);

@@ -104,6 +104,43 @@ TEST(BakeEmitters, ABulbOfManyTrianglesIsASphere) {
     EXPECT_LT(each, 0.03);
 }
 
+// Kept for 60 x 60 x 60 m, chances of a thousand emitters would take a gigabyte for each set.
+TEST(Emitters, WhatIsNotKeptIsFoundAgainAlike) {
+    Scene scene;
+    addFloor(scene, 8, addMaterial(scene, lambert(0.5f)));
+    scene.light_sets = {{"a", 1}, {"b", 1}};
+    for (uint32_t set = 0; set < 2; ++set) {
+        addSphere(scene, 0.5, 24, 12, addMaterial(scene, emissive(glm::vec3(100))));
+        SceneMesh& bulb = scene.meshes.back();
+        bulb.light_set = set;
+        for (glm::uvec3& t : bulb.triangles) std::swap(t.y, t.z);
+        for (glm::vec3& p : bulb.positions_m) p += glm::vec3(4 * static_cast<float>(set), 3, 0);
+    }
+    const RayScene rays(scene);
+    constexpr size_t few = 5000;
+    const EmitterSampler all(rays, meshGroups(scene)), some(rays, meshGroups(scene), few);
+    EXPECT_GT(all.keptChoices(), 10 * few);
+    EXPECT_LE(all.keptChoices(), kept_choices_max);
+    EXPECT_LE(some.keptChoices(), few);
+    for (uint32_t i = 0; i < 3000; ++i) {
+        const glm::vec2 u = sequence2d(i, 5);
+        const glm::vec3 place(16 * u.x - 8, 0.001f, 16 * u.y - 8);
+        const uint32_t cell = all.cellAt(place);
+        const auto kept = all.groups(cell), found = some.groups(cell);
+        ASSERT_EQ(kept.size(), found.size());
+        for (size_t g = 0; g < kept.size(); ++g) {
+            const float choice = unitFloat(hash(i, 1));
+            const EmitterSample a = all.sample(kept[g], place, choice, u), b = some.sample(found[g], place, choice, u);
+            ASSERT_EQ(a.triangle, b.triangle);
+            ASSERT_EQ(a.pdf, b.pdf);
+            if (!(a.pdf > 0)) continue;
+            const Emitter& e = *all.emitterOf(a.triangle);
+            ASSERT_EQ(all.pdf(cell, e, a.distance_m, 0.5f),
+                      some.pdf(cell, *some.emitterOf(a.triangle), a.distance_m, 0.5f));
+        }
+    }
+}
+
 // Two bulbs of 2,208 triangles, one set: 4 m below the one, the other, 30 m off, has a 430th of its light, and half of
 // each looks away. When chances were by power alone, a quarter of the samples met what shines there.
 TEST(Emitters, OfThousandsThoseThatShineHereAreChosen) {

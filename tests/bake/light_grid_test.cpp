@@ -2,12 +2,16 @@
 #include <bake/baked_scene.h>
 #include <bake/direct.h>
 #include <bake/light_grid.h>
+#include <bake/reached_cells.h>
 #include <bake/test_scenes.h>
+#include <models/model_scenes.h>
 #include <tbb/global_control.h>
 
 #include <limits>
+#include <map>
 #include <random>
 #include <set>
+#include <string>
 
 namespace dimmer::cook::test {
 namespace {
@@ -42,6 +46,77 @@ TEST(LightGrid, ListsTheLampsOfTheRoomAlone) {
         for (const glm::vec3 p : {glm::vec3(2.99f, -1.99f, 2.99f), glm::vec3(-2.99f, 1.99f, -2.99f), glm::vec3(0)})
             EXPECT_EQ(listedAt(grid, p + glm::vec3(x, 0, 0)), std::set<uint32_t>{r});
     }
+}
+
+// Cells that grew with the level listed lamps of five rooms here.
+TEST(LightGrid, WhatStandsFarAwayWidensNoCell) {
+    Scene scene = rooms(6);
+    addQuad(scene, "far away", {2000, 0, 0}, {0, 1, 0}, {0, 0, 1}, 0);
+    const RayScene rays(scene);
+    const LightGrid grid(rays);
+    for (uint32_t r = 0; r < 6; ++r)
+        for (const glm::vec3 p : {glm::vec3(2.99f, -1.99f, 2.99f), glm::vec3(-2.99f, 1.99f, -2.99f), glm::vec3(0)})
+            EXPECT_EQ(listedAt(grid, p + glm::vec3(8.0f * static_cast<float>(r), 0, 0)), std::set<uint32_t>{r});
+}
+
+// A plain of 10 km, and lamps that see all of it, or as far as their range goes: nothing is missed, and no list is
+// long.
+TEST(LightGrid, LargeLevelsTakeNoMoreCellsForALamp) {
+    Scene scene;
+    addFloor(scene, 5000, addMaterial(scene, lambert(0.5f)));
+    addQuad(scene, "mast", {0, 200, 0}, {0, 200, 0}, {0, 0, 0.01f}, 0);
+    addPointLight(scene, {-4000, 300, 30}, 1e6f, BakeMode::Indirect);
+    addPointLight(scene, {-4000, 50, 30}, 100, BakeMode::Indirect).range_m = 150.0f;
+    const RayScene rays(scene);
+    const LightGrid grid(rays);
+    EXPECT_LE(grid.entryCount(), 2 * cells_of_light_max);
+    for (float x = -4999; x < 5000; x += 113)
+        for (float z = -4999; z < 5000; z += 113) ASSERT_EQ(listedAt(grid, {x, 0, z}).count(0), 1u) << x << " " << z;
+    EXPECT_EQ(listedAt(grid, {-3870, 0, 30}), (std::set<uint32_t>{0, 1}));
+    EXPECT_EQ(listedAt(grid, {-3600, 0, 30}), std::set<uint32_t>{0});
+}
+
+TEST(LightGrid, OfSomeGroupsTellsOnlyTheirLights) {
+    Scene scene = rooms(1);
+    scene.light_sets = {{"a", 1}, {"b", 1}};
+    for (const BakeMode mode : {BakeMode::Indirect, BakeMode::Full})
+        for (const uint32_t set : {0u, 1u}) addPointLight(scene, {0, 0, 0.1f}, 60, mode).light_set = set;
+    const RayScene rays(scene);
+    const LightGrid all(rays);
+    for (const std::vector<uint8_t>& groups : std::vector<std::vector<uint8_t>>{{1, 0, 0}, {0, 1, 0}, {1, 0, 1}}) {
+        std::vector<uint32_t> some, alone;
+        all.ofGroups(groups).forEach({1, 1, 1}, [&](uint32_t light) { some.push_back(light); });
+        LightGrid(rays, true, groups).forEach({1, 1, 1}, [&](uint32_t light) { alone.push_back(light); });
+        EXPECT_EQ(some, alone);
+        EXPECT_FALSE(some.empty());
+    }
+}
+
+class CountedStages : public SilentProgress {
+   public:
+    void stage(std::string_view name, uint64_t) override { ++count[std::string(name)]; }
+    std::map<std::string, int> count;
+};
+
+// Not for pairs of doors, models' grids and the sites of the global grid again.
+TEST(LightGrid, ABakeLooksOnceWhereLampsShine) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addBox(scene, {3, 1, 1}, white);
+    scene.doors = {{"a", false}, {"b", false}};
+    for (uint32_t d = 0; d < 2; ++d)
+        addSolid(scene, "leaf", {-1 + 2 * static_cast<float>(d), 0, 0}, {0.1f, 1, 1}, white, d);
+    addPointLight(scene, {-0.2f, 0.2f, 0.1f}, 100, BakeMode::Indirect);
+    addCrate(scene, "crate", placed({0.3, -0.7, 0.2}, 0.5), {0.3f, 0.3f, 0.3f}, white);
+    listModels(scene, {.spacing_m = 0.7f});
+    const BakedScene b(scene);
+    CountedStages stages;
+    BakeSettings settings{.series_rays = 32, .final_rays = 1};
+    settings.grid.probes_max = 50;
+    bake(*b.rays, b.charts, b.texels, settings, stages);
+    for (const char* stage : {"direct light and links", "direct light and links for pairs of doors", "local grids",
+                              "light at probe sites", "rays from lamps"})
+        EXPECT_EQ(stages.count[stage], 1) << stage;
 }
 
 TEST(LightGrid, LampsThatAreOffAreAskedForNowhere) {

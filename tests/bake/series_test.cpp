@@ -84,8 +84,8 @@ TEST(Series, FewReceiversSendTheFaintLightOfAll) {
     addPointLight(scene, {3, 0.2f, 0.1f}, 100, BakeMode::Indirect).light_set = 0;
     GatheredLevel level(scene, 16);
     SilentProgress quiet;
-    const Series all = expandSeries(level.gatherer, {.threshold = 0}, quiet);
-    const Series some = expandSeries(level.gatherer, {.threshold = 0.01f}, quiet);
+    const Series all = expandSeries(level.gatherer, LightGrid(*level.b.rays), {.threshold = 0}, quiet);
+    const Series some = expandSeries(level.gatherer, LightGrid(*level.b.rays), {.threshold = 0.01f}, quiet);
     const uint32_t lamp = 1;
     const auto exitance = [&](const SparseLight& radiance, size_t i) {
         const auto row = radiance.row(i);

@@ -52,7 +52,9 @@ TEST_F(BenchTest, CountsWhatEachCaseTouches) {
     EXPECT_EQ(toggled["name"], "set set2 toggled");
     EXPECT_EQ(toggled["batches"], batches);
     EXPECT_EQ(toggled["receivers"], receivers);
-    for (const char* spread : {"gpu_us", "host_us"})
+    EXPECT_EQ(json["clock"], "host");
+    EXPECT_TRUE(toggled["gpu_us"].is_null()) << "no GPU took part";
+    for (const char* spread : {"process_us", "host_us"})
         EXPECT_LE(toggled[spread]["min"].get<double>(), toggled[spread]["max"].get<double>());
 }
 

@@ -199,10 +199,12 @@ typedef struct dimmer_update_stats {
     uint64_t receivers; /* texels and probes written */
     uint64_t bytes_read, bytes_written;
     double host_us;
-    double gpu_us;              /* by timestamps, from dimmer_lights_wait(); else 0 */
-    uint32_t clusters_put_off;  /* by dimmer_lights_set_limits()'s tolerance_quanta */
-    uint64_t receivers_waiting; /* left for later updates by its receivers_max, at most */
-    uint64_t probes_resampled;  /* of models that move */
+    double gpu_us;             /* by timestamps, from dimmer_lights_wait(); else 0 */
+    uint32_t clusters_put_off; /* by dimmer_lights_set_limits()'s tolerance_quanta */
+    /* Left for later updates by its receivers_max, at most, of the state that is being written: with two sets of pages
+       a newer one may follow. Pages hold the last weights once an update has no dispatch and none is waiting. */
+    uint64_t receivers_waiting;
+    uint64_t probes_resampled; /* of models that move */
 } dimmer_update_stats;
 
 /* Blends what changed, on the CPU and before it returns. DIMMER_UNSUPPORTED for lights on Vulkan. */

@@ -124,9 +124,11 @@ struct UpdateStats {
     uint32_t batches = 0;
     uint64_t receivers = 0;
     uint32_t dispatches = 0;
-    uint32_t clusters_put_off = 0;   // by UpdateLimits::tolerance_quanta
-    uint64_t receivers_waiting = 0;  // left for later updates by UpdateLimits::receivers_max, at most
-    uint64_t probes_resampled = 0;   // of moving models
+    uint32_t clusters_put_off = 0;  // by UpdateLimits::tolerance_quanta
+    // Left for later updates by UpdateLimits::receivers_max, at most, of the state that is being written: with two sets
+    // of pages a newer one may follow. Pages hold the last weights once an update has no dispatch and none is waiting.
+    uint64_t receivers_waiting = 0;
+    uint64_t probes_resampled = 0;  // of moving models
     uint64_t bytes_read = 0;
     uint64_t bytes_written = 0;
     double host_us = 0;  // planning and recording
