@@ -254,6 +254,14 @@ TEST_F(Outputs, LookedAtBeforeTheWork) {
     EXPECT_FALSE(std::filesystem::exists(file("nowhere")));
 }
 
+TEST_F(Outputs, StdoutIsNoFile) {
+    const std::string figures = write("-", R"({"surface": {}, "floor_lux": 1})");
+    const auto result = runProcess(
+        "/bin/sh", {"-c", "cd '" + file("") + "' && '" + DIMMER_TOOL + "' verify none.gltf '" + pack() + "' --json -"});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_TRUE(std::filesystem::exists(figures)) << "a file of that name is somebody else's";
+}
+
 TEST_F(Outputs, NumbersAndNamesThatMeanNothing) {
     expectRefusedAtOnce({"bench", pack(), "--mode", "cpu", "--only", "nothing-like-that"},
                         {"nothing-like-that", "nothing changed, set one toggled", "all sets changed"});

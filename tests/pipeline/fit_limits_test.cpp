@@ -109,6 +109,23 @@ TEST(FitLimits, ProbesGiveAllWhereTexelsGiveNothing) {
     EXPECT_TRUE(remedy.fits);
 }
 
+// The box's eight corners stay: where 1.5 kB of 110 would leave one or two probes of 104, one stays beside them, 0.9
+// kB, and the coarsest pages, 0.4, fit beside that.
+TEST(FitLimits, AsManyProbesGoAsCan) {
+    PackCost cost;
+    cost.base_lightmap = 100000;
+    cost.global_grid = 10000;
+    Profile profile;
+    profile.budget_total = 1500;
+    const Remedy remedy = fittingRemedy(withGlobalProbes(104), cost, profile, {});
+    ASSERT_EQ(remedy.changes.size(), 2u);
+    EXPECT_EQ(remedy.changes[0].key, "lightmaps.texels_per_metre");
+    EXPECT_EQ(remedy.changes[1].key, "grids.probes_max");
+    EXPECT_EQ(remedy.changes[1].to, 1);
+    profile.budget_total = 1000;
+    EXPECT_TRUE(fittingRemedy(withGlobalProbes(9), cost, profile, {}).changes.empty()) << "none can go";
+}
+
 // Records of probes go with them: 20 kB of fixed pages, 80 of grid and 100 of records make 60 kB with few enough
 // probes.
 TEST(FitLimits, RecordsOfProbesGoWithThem) {

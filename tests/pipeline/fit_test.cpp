@@ -467,6 +467,31 @@ TEST(TooSmallForTexels, IsSaidOfLevelsInAnotherUnit) {
     }
 }
 
+// What is small altogether is no level, however wide most of it is: a yard of 1 m.
+TEST(TooSmallForTexels, IsSaidOfWhatIsSmallerThanAPerson) {
+    for (const float half_m : {0.5f, 1.0f}) {
+        Scene scene;
+        scene.file = "level.glb";
+        addFloor(scene, half_m, addMaterial(scene, lambert(0.5f)));
+        const BakedScene b(scene, 8, 4);
+        const auto warning = tooSmallForTexels(*b.rays, b.charts, b.texels);
+        EXPECT_EQ(warning.has_value(), half_m < 1);
+        if (!warning) continue;
+        EXPECT_THAT(*warning, HasSubstr("level.glb: is 1.00 x 0.00 x 1.00 m large, smaller than a person"));
+    }
+}
+
+// A sliver may have no area left on its page, and by that infinitely many texels.
+TEST(TooLargeForTexels, CountsNoSlivers) {
+    Scene scene;
+    addBox(scene, {2, 1.4f, 2}, addMaterial(scene, lambert(0.5f)));
+    const RayScene rays(scene);
+    auto charts = unwrap(rays, {.texels_per_metre = 1.5f, .page_size = 2048});
+    ASSERT_TRUE(charts.has_value());
+    charts->texel_area_m2[3] = 0;
+    EXPECT_FALSE(tooLargeForTexels(rays, *charts));
+}
+
 // A room of 4 m, and one of 400 numbers that are centimetres.
 TEST(TooLargeForTexels, IsSaidOfLevelsInAnotherUnit) {
     for (const float half_m : {2.0f, 200.0f}) {

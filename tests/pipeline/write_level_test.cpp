@@ -1,4 +1,5 @@
 // `cook --write-level`: a level with its final UVs that is valid glTF, draws like the pack, and cooks like the source.
+#include <charts/file_uv.h>
 #include <charts/unwrap.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -352,6 +353,32 @@ TEST(WriteLevel, ImportsAsTheSameLevelWithoutNewCharts) {
         std::ranges::count_if(after->meshes, [](const SceneMesh& m) { return m.lighting != Lighting::Dynamic; });
     EXPECT_GE(charts->charts.size(), static_cast<size_t>(lit));
     EXPECT_TRUE(std::ranges::all_of(charts->charts, &Chart::curved));
+}
+
+// Charts are a texel wide at least, whatever lies on them, and pages as high as charts need: neither is a fault when
+// the level comes back.
+TEST(WriteLevel, ItsOwnUnwrapIsTaken) {
+    LevelFile level = richLevel();
+    // A bar that stands, and one that lies on it.
+    const int railing = level.addMesh({{0.2, 0, 1.5},
+                                       {0.23, 0, 1.5},
+                                       {0.23, 2.5, 1.5},
+                                       {0.2, 2.5, 1.5},
+                                       {0.2, 2.6, 1.5},
+                                       {2.7, 2.6, 1.5},
+                                       {2.7, 2.63, 1.5},
+                                       {0.2, 2.63, 1.5}},
+                                      std::vector<glm::vec3>(8, {0, 0, 1}), {0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7}, 0);
+    level.addNode({{"name", "railing"}, {"mesh", railing}, {"extras", {{"dimmer_lighting", "lightmap"}}}});
+    for (const uint32_t page_size : {64u, 512u}) {
+        const Written written(level, page_size, 4);
+        const PackData& pack = written.cooked.pack;
+        EXPECT_TRUE(page_size < 512 || pack.page_width != pack.page_height);
+        auto scene = importLevel(written.path);
+        ASSERT_TRUE(scene) << scene.error().message;
+        dropInvalidUnwraps(*scene, 4);
+        for (const SceneMesh& mesh : scene->meshes) EXPECT_EQ(mesh.uv1_fault, "") << mesh.node;
+    }
 }
 
 // The level that was written, cooked, is lit like its source.
