@@ -14,6 +14,9 @@ using Point = std::array<double, 3>;
 // About so many cells, of at most so many along an axis: 64 kB. A level of 120 x 105 x 35 m has cells of 3 m.
 constexpr double cells_aim = 16384;
 constexpr double cells_along_max = 64;
+// Rows and cells that may be looked at for each tetrahedron and cell, in the mean: of the house's 15,114 tetrahedra a
+// fifth of that are.
+constexpr size_t looked_at_max = 64;
 // Walks take a place in that is outside by this share of a tetrahedron; twice that, for their rounding.
 constexpr double outside_max = 2 * double{inside_tolerance};
 
@@ -80,9 +83,11 @@ LitCells::LitCells(const PackData& data) {
     changed_in_.resize(size_t{counts_[0]} * counts_[1] * counts_[2]);
 
     std::vector<Run> runs;
-    std::vector<size_t> ends;  // of each tetrahedron's runs
+    std::vector<size_t> ends;  // of each tetrahedron's runs, but for those that are everywhere
+    size_t left = looked_at_max * (grid.tetrahedra.size() + changed_in_.size());
     for (const Tetrahedron& t : grid.tetrahedra) {
-        addCellsOf(grid, t, runs);
+        if (left == 0) break;
+        left -= std::min(left, addCellsOf(grid, t, runs));
         ends.push_back(runs.size());
     }
     const TetrahedraOfProbes tetrahedra(grid);
@@ -91,15 +96,19 @@ LitCells::LitCells(const PackData& data) {
     for (uint32_t number = 0; number < data.probes.clusters.size(); ++number) {
         const Cluster& cluster = data.probes.clusters[number];
         const auto receivers = std::span(data.probes.numbers).subspan(cluster.first_receiver, cluster.receiver_count);
+        const size_t begin = cells_.size();
+        everywhere_.push_back(false);
         for (const uint32_t probe : receivers) {
             if (probe >= grid.positions.size()) continue;  // of a local grid
             for (const uint32_t t : tetrahedra.of(probe)) {
-                if (std::exchange(last_of_tetrahedron[t], number) == number) continue;
+                if (t >= ends.size()) everywhere_.back() = true;
+                if (everywhere_.back() || std::exchange(last_of_tetrahedron[t], number) == number) continue;
                 for (size_t i = t == 0 ? 0 : ends[t - 1]; i < ends[t]; ++i)
                     for (uint32_t cell = runs[i].first; cell < runs[i].first + runs[i].count; ++cell)
                         if (std::exchange(last_of_cell[cell], number) != number) cells_.push_back(cell);
             }
         }
+        if (everywhere_.back()) cells_.resize(begin);
         ends_.push_back(static_cast<uint32_t>(cells_.size()));
     }
 }
@@ -111,7 +120,7 @@ uint32_t LitCells::along(size_t axis, double place_m) const {
 }
 
 // Those that hold a place which a walk may take for one of the tetrahedron's.
-void LitCells::addCellsOf(const GlobalGrid& grid, const Tetrahedron& tetrahedron, std::vector<Run>& runs) const {
+size_t LitCells::addCellsOf(const GlobalGrid& grid, const Tetrahedron& tetrahedron, std::vector<Run>& runs) const {
     std::array<Point, 4> corners;
     for (size_t i = 0; i < 4; ++i) {
         const ProbePosition& p = grid.positions[tetrahedron.probes[i]];
@@ -135,8 +144,10 @@ void LitCells::addCellsOf(const GlobalGrid& grid, const Tetrahedron& tetrahedron
             at_first[i] += planes.n[i][axis] * middle_m + 0.5 * std::abs(planes.n[i][axis]) * cell_m_[axis];
         }
     }
+    size_t looked_at = 0;
     for (uint32_t z = first[2]; z <= last[2]; ++z)
         for (uint32_t y = first[1]; y <= last[1]; ++y) {
+            ++looked_at;
             double begin = 0, end = last[0] - first[0];  // in cells
             for (size_t i = 0; i < 4; ++i) {
                 const double start = at_first[i] + planes.n[i][1] * cell_m_[1] * (y - first[1]) +
@@ -153,15 +164,19 @@ void LitCells::addCellsOf(const GlobalGrid& grid, const Tetrahedron& tetrahedron
             if (begin > end) continue;
             runs.push_back(
                 {numberOf({first[0], y, z}) + static_cast<uint32_t>(begin), static_cast<uint32_t>(end - begin) + 1});
+            looked_at += runs.back().count;
         }
+    return looked_at;
 }
 
 void LitCells::change(uint32_t cluster) {
+    if (everywhere_[cluster]) all_changed_in_ = round_;
     const uint32_t begin = cluster == 0 ? 0 : ends_[cluster - 1];
     for (uint32_t i = begin; i < ends_[cluster]; ++i) changed_in_[cells_[i]] = round_;
 }
 
 bool LitCells::changedIn(const Box& box) const {
+    if (all_changed_in_ == round_) return true;
     Cell first, last;
     for (size_t axis = 0; axis < 3; ++axis) {
         first[axis] = along(axis, box.min_m[axis]);
@@ -177,6 +192,7 @@ bool LitCells::changedIn(const Box& box) const {
 void LitCells::clear() {
     if (++round_ != 0) return;
     std::ranges::fill(changed_in_, 0);  // the count began anew: what is older could look new
+    all_changed_in_ = 0;
     round_ = 1;
 }
 

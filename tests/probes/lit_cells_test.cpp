@@ -64,6 +64,27 @@ TEST(LitCells, NoPlaceThatAChangedClusterLightsIsMissed) {
     }
 }
 
+// Nothing but its indices is asked of a file's tetrahedra: a million across the level took minutes and gigabytes. What
+// is not looked at counts as everywhere, also for places that none of them reaches.
+TEST(LitCells, TetrahedraAcrossTheLevelTakeNoMoreThanOthers) {
+    PackData data = darkPack(1, 30);
+    test::addLightOnProbes(data, 0, 0, [](glm::vec3) { return true; });
+    GlobalGrid& grid = data.probes.global;
+    const glm::vec3 low = 0.01f * room_m, high = 0.99f * room_m, far_off = room_m * glm::vec3(0.95f, 0.05f, 0.95f);
+    const std::array corners = {low, glm::vec3(low.x, low.y, high.z), glm::vec3(low.x, high.y, low.z), high};
+    for (uint32_t i = 0; i < 4; ++i) grid.positions[i] = {corners[i].x, corners[i].y, corners[i].z};
+    const Tetrahedron across{.probes = {0, 1, 2, 3}};
+    for (const uint32_t count : {10u, 20000u}) {
+        grid.tetrahedra.assign(count, across);
+        LitCells cells(data);
+        cells.change(0);
+        EXPECT_TRUE(changedAt(cells, 0.5f * (low + high)));
+        EXPECT_EQ(changedAt(cells, far_off), count > 10) << count;
+        cells.clear();
+        EXPECT_FALSE(changedAt(cells, 0.5f * (low + high)));
+    }
+}
+
 // How far a place is outside a tetrahedron, at least: from its box or one of its faces.
 float distanceAtLeast(const GlobalGrid& grid, const Tetrahedron& tetrahedron, glm::vec3 p) {
     std::array<glm::vec3, 4> corners;
