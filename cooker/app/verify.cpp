@@ -78,6 +78,8 @@ void printReport(const VerifyReport& r, const VerifyOptions& options) {
         fmt::print("{:<26} {:>8} {:>+6.2f} % {:>8} {:>8.2f} % {:>12.2f} %\n", s.name,
                    s.effect.points == 0 ? "-" : fmt::format("{:.2f} %", 100 * s.effect.error), 100 * s.effect.bias,
                    s.effect.points, 100 * s.effect.reference_noise, 100 * s.energy_dropped);
+    if (!r.sets.empty() && r.doors.empty())
+        fmt::print("error: sum |dE - dE_ref| / sum |dE_ref|, dE what the set adds: places count by their light\n");
     if (options.doors && r.doors.empty()) fmt::print("\ndoors: the level has none that the state leaves closed\n");
     if (!r.doors.empty())
         fmt::print("\n{:<16} {:<20} {:>17} {:>8} {:>8} {:>10} {:>10} {:>18}\n", "door, opened", "light", "error",

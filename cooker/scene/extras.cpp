@@ -120,14 +120,16 @@ Expected<std::optional<size_t>> Extras::choice(std::string_view key,
 
 void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, ExtrasPlace place,
                      const std::string& owner) {
-    const auto here = place == ExtrasPlace::Node ? std::span<const std::string_view>(node_keys) : scene_keys;
-    const auto elsewhere = place == ExtrasPlace::Node ? std::span<const std::string_view>(scene_keys) : node_keys;
+    if (extras.IsString() && extras.Get<std::string>().find("dimmer_") != std::string::npos)
+        context.warn(owner, "its extras are a text and were ignored; keys are members of an object.");
     for (const std::string& key : extras.Keys()) {
         const std::string meant = asKeysAreWritten(key);
-        if (!meant.starts_with("dimmer_") || contains(here, key)) continue;
-        if (contains(elsewhere, key))
+        const bool of_nodes = contains(node_keys, key), of_scenes = contains(scene_keys, key);
+        const bool right = place == ExtrasPlace::Node ? of_nodes : place == ExtrasPlace::Scene && of_scenes;
+        if (!meant.starts_with("dimmer_") || right) continue;
+        if (of_nodes || of_scenes)
             context.warn(owner, fmt::format("'{}' has no meaning here and was ignored; it belongs in the extras of {}.",
-                                            key, place == ExtrasPlace::Node ? "the scene" : "a node"));
+                                            key, of_scenes ? "the scene" : "a node"));
         else
             context.warn(
                 owner, fmt::format("'{}' is not a known key and was ignored; did you mean '{}'?", key, nearest(meant)));

@@ -50,7 +50,7 @@ class Extras {
 // Of `dimmer_bake`, in the order of BakeMode.
 inline constexpr std::array<std::string_view, 3> bake_modes = {"indirect", "full", "none"};
 
-enum class ExtrasPlace { Node, Scene };
+enum class ExtrasPlace { Node, Scene, File };
 
 // Warns of `dimmer_*` keys that do not exist, or not in this place, with the nearest one that does.
 void warnUnknownKeys(ImportContext& context, const tinygltf::Value& extras, ExtrasPlace place,

@@ -80,6 +80,7 @@ class LevelImporter {
         warnAll(model_.lights, &ImportContext::lightLabel);
         warnAll(model_.materials, &ImportContext::materialLabel);
         warnUnknownKeys(context_, sceneExtras(), ExtrasPlace::Scene, "scene");
+        warnUnknownKeys(context_, model_.extras, ExtrasPlace::File, "the file's own extras");
     }
 
     Expected<void> nodes() {

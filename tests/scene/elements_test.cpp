@@ -495,6 +495,17 @@ TEST(SceneElements, KeysInAnotherSpellingAreTold) {
     }
 }
 
+TEST(SceneElements, KeysWhereNothingReadsThemAreTold) {
+    LevelFile level = levelWithLamp("dimmer_light_set=hall");
+    level.document["extras"] = {{"dimmer_sky_luminance", 10}, {"dimmer_light_set", "hall"}, {"mood", "calm"}};
+    const auto scene = level.import();
+    ASSERT_IMPORTED(scene);
+    EXPECT_EQ(scene->warnings.size(), 3u);
+    expectWarning(*scene, {"node 'lamp'", "a text", "object"});
+    expectWarning(*scene, {"the file's own extras", "'dimmer_sky_luminance'", "extras of the scene"});
+    expectWarning(*scene, {"the file's own extras", "'dimmer_light_set'", "extras of a node"});
+}
+
 TEST(SceneElements, OtherScenesAreTold) {
     LevelFile level = levelWithLamp({});
     level.document["scenes"].push_back({{"name", "backstage"}, {"nodes", json::array({0})}});
