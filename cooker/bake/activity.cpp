@@ -27,6 +27,10 @@ constexpr float door_change_factor = 3;
 // may end below its own threshold, down to a share of it.
 constexpr float always_on_factor = 3, dark_threshold_share = 0.2f;
 
+float thresholdAt(const TermReport& report, float always_on_lux) {
+    return std::clamp(report.share_of_always_on * always_on_lux, report.dark_threshold_lux, report.threshold_lux);
+}
+
 }  // namespace
 
 // Per term the luminances, lux, of the receivers that its mean is taken over, and how many these are; and what groups
@@ -205,10 +209,6 @@ void Activity::forEachPair(const Series& light, size_t begin, size_t end, auto&&
             direct[t] = bounced[t] = left_out[t] = 0;
         }
     }
-}
-
-float thresholdAt(const TermReport& report, float always_on_lux) {
-    return std::clamp(report.share_of_always_on * always_on_lux, report.dark_threshold_lux, report.threshold_lux);
 }
 
 bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux, float always_on_lux) {

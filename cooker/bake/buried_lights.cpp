@@ -55,9 +55,8 @@ std::vector<std::string> warningsOfBuriedLights(const RayScene& rays) {
         const Around around = lookAround(rays, light.position_m);
         if (2 * around.backs <= directions && around.casing == directions)
             warnings.push_back(fmt::format(
-                "{}: node '{}': the light is shut in by node '{}', which lets none of it out. It is kept; take it out "
-                "of "
-                "there, or make that node 'dimmer_lighting' = 'dynamic', which takes its own emission away too",
+                "{}: node '{}': the light is shut in by node '{}', which lets none of it out. It is kept; take it out, "
+                "or make that node 'dimmer_lighting' = 'dynamic', which takes its own emission away too",
                 rays.scene().file, light.node, around.node));
         if (2 * around.backs <= directions) continue;
         warnings.push_back(
