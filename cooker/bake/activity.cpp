@@ -110,8 +110,10 @@ bool Activity::seesDoorOf(size_t receiver, uint32_t term) const {
 void Activity::measure(Series& series) const {
     series.reports = thresholds(series, 1);
     series.threshold_base.clear();
+    series.group_of.clear();
     for (uint32_t t = 0; t < paths_.termCount(); ++t) {
-        const float share = settings_.thresholdOf(paths_.terms()[t].group);
+        series.group_of.push_back(paths_.terms()[t].group);
+        const float share = settings_.thresholdOf(series.group_of[t]);
         series.threshold_base.push_back(share > 0 ? series.reports[t].threshold_lux / share : 0.0f);
     }
 }
@@ -126,7 +128,7 @@ void Activity::decide(Series& series) const {
         sumOverRows(gatherer_.receiverCount(), Sums(terms), [&](size_t begin, size_t end, Sums& sum) {
             forEachPair(series, begin, end, [&](size_t i, uint32_t t, float direct, float, float stored) {
                 const auto row = active.row(i);
-                bool kept = series.active(t, direct, 0, series.alwaysOnLux(i));
+                bool kept = series.active(t, direct, 0, series.alwaysOnLux(i, t));
                 for (uint32_t into = t; !kept && into != no_term; into = paths_.lessClosed(into))
                     kept = std::ranges::find(row, into, term_of) != row.end();
                 if (!kept) sum.of[t] += static_cast<double>(gatherer_.areaM2(i) * stored);
@@ -157,10 +159,9 @@ SparseLight Activity::activeAround(const Series& series) const {
             else
                 add(i);
             row.clear();
-            const float always_on_lux = series.alwaysOnLux(i);
             for (const uint32_t t : sum.touched()) {
                 const TermLight mean(t, sum[t] / count, rounding);
-                if (series.active(t, 0, luminance(mean.value()), always_on_lux)) row.push_back(mean);
+                if (series.active(t, 0, luminance(mean.value()), series.alwaysOnLux(i, t))) row.push_back(mean);
             }
             sum.clear();
             emit(std::span<const TermLight>(row));
@@ -217,11 +218,12 @@ bool isActive(const TermReport& report, uint32_t term, float direct_lux, float b
            (bounced_lux > 0 && bounced_lux >= threshold);
 }
 
-float Series::alwaysOnLux(size_t receiver) const {
+float Series::alwaysOnLux(size_t receiver, uint32_t term) const {
     float lux = 0;
+    if (!(reports[term].share_of_always_on > 0)) return lux;
     for (const auto* part : {&direct, &bounced})
         for (const TermLight& l : part->row(receiver))
-            if (l.term == always_group) lux += luminance(l.value());
+            if (l.term == group_of[term]) lux += luminance(l.value());
     return lux;
 }
 
@@ -232,17 +234,16 @@ float Series::keepUpTo(size_t receiver, uint32_t term) const {
             if (l.term == term) brightest = std::max(brightest, luminance(l.value()));
     const TermReport& report = reports[term];
     float base = term == always_group ? 0 : threshold_base[term];
-    if (report.threshold_lux > 0) base *= thresholdAt(report, alwaysOnLux(receiver)) / report.threshold_lux;
+    if (report.threshold_lux > 0) base *= thresholdAt(report, alwaysOnLux(receiver, term)) / report.threshold_lux;
     return base > 0 ? brightest / base : std::numeric_limits<float>::infinity();
 }
 
 void Series::activeTerms(size_t receiver, std::vector<uint32_t>& terms) const {
-    const float always_on_lux = alwaysOnLux(receiver);
     terms.assign(1, always_group);
-    for (const TermLight& l : direct.row(receiver))
-        if (l.term != always_group && active(l.term, luminance(l.value()), 0, always_on_lux)) terms.push_back(l.term);
-    for (const TermLight& l : bounced.row(receiver))
-        if (l.term != always_group && active(l.term, 0, luminance(l.value()), always_on_lux)) terms.push_back(l.term);
+    for (const auto* part : {&direct, &bounced})
+        for (const TermLight& l : part->row(receiver))
+            if (l.term != always_group && active(l.term, luminance(l.value()), 0, alwaysOnLux(receiver, l.term)))
+                terms.push_back(l.term);
     std::ranges::sort(terms);
     terms.erase(std::unique(terms.begin(), terms.end()), terms.end());
 }

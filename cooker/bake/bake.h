@@ -74,8 +74,9 @@ struct TermReport {
     uint64_t measured_over = 0;
     float mean_lux = 0;  // luminance
     float threshold_lux = 0;
-    // Always-on light through doors ends at that share of what is there of such light with all doors closed, within
-    // these two limits; all else at threshold_lux.
+    // Always-on light through doors ends at that share of what is there of its own group's with all doors closed (that
+    // of another would make a group's light another one's matter, and a cache keeps each by itself), within these two
+    // limits; all else at threshold_lux.
     float dark_threshold_lux = 0, share_of_always_on = 0;
     double energy = 0;          // luminous flux arriving as storable light, lm, estimated by the series
     double energy_dropped = 0;  // share of it where neither the term is active nor one that takes it along, 0..1

@@ -245,7 +245,7 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     const PunctualLight& light = rays_.scene().lights[lamps_[lamp].index];
     const glm::vec3 away = lampDirection(light, path.next2());
     const auto hit = rays_.nearest(light.position_m + away * lamp_lift_m, away, far_away_m, path.nextBits());
-    const auto lit = hit ? vertexAt(*hit) : std::nullopt;
+    const auto lit = hit ? vertexAt(*hit, away) : std::nullopt;
     if (!lit) return glm::vec3(0);
     const glm::vec3 to_lit = lit->point - vertex.point;
     const float distance2 = glm::dot(to_lit, to_lit), distance = std::sqrt(distance2);
@@ -309,15 +309,25 @@ glm::vec3 ReferenceTracer::skyLight(const Vertex& vertex, Path& path) const {
                        (by_sky + cos_surface / pi));
 }
 
+// Back the way that the ray came, where nothing can stand: straight up is beyond the other surface where two meet at an
+// acute angle. Grazing rays stay nearer to the surface than others, and no nearer than rounding allows.
+glm::vec3 offSurface(const Hit& hit, glm::vec3 direction, glm::vec3 point, glm::vec3 normal) {
+    constexpr float back_max_m = 0.01f;
+    const float offset_m = liftOff(point, path_offset_m), least_m = liftOff(point, 0);
+    const float cosine = std::max(-glm::dot(direction, normal), 1e-6f);
+    const float back_m = std::min({offset_m / cosine, hit.distance_m / 2, back_max_m});
+    return point - direction * back_m + normal * std::max(0.0f, least_m - back_m * cosine);
+}
+
 // The surface that was hit as the next vertex; empty where it reflects nothing.
-std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit) const {
+std::optional<ReferenceTracer::Vertex> ReferenceTracer::vertexAt(const Hit& hit, glm::vec3 direction) const {
     const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
     const Material& material = rays_.scene().materials[triangle.material];
     if (hit.back && !material.double_sided) return std::nullopt;
     if (rays_.scene().meshes[triangle.mesh].lighting == Lighting::None) return std::nullopt;
     const glm::vec3 normal = hit.back ? -triangle.normal : triangle.normal;
     const glm::vec3 point = rays_.pointOn(hit.triangle, hit.u, hit.v);
-    return Vertex{.point = point + normal * liftOff(point, path_offset_m),
+    return Vertex{.point = offSurface(hit, direction, point, normal),
                   .normal = normal,
                   .reflectance = material.reflectance(glm::vec3(rays_.surfaceColor(hit.triangle, hit.u, hit.v)))};
 }
@@ -356,7 +366,7 @@ glm::vec3 ReferenceTracer::trace(Vertex vertex, Path& path) const {
         if (const uint32_t light = area_light_of_[hit->triangle]; light != none)
             sum += throughput * area_lights_[light].radiance_cd_m2 *
                    (by_hit / (by_hit + areaPdf(vertex, light, hit->distance_m, cos_there)));
-        auto next = vertexAt(*hit);
+        auto next = vertexAt(*hit, direction);
         if (!next) return sum;
         throughput *= next->reflectance;
         const float distance2 = std::max(hit->distance_m * hit->distance_m, 1e-12f);

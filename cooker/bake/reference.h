@@ -98,7 +98,7 @@ class ReferenceTracer {
     glm::vec3 punctual(const Vertex& vertex, const Vertex& from, float by_hit, Path& path) const;
     glm::vec3 lampBounce(const Vertex& vertex, Path& path) const;
     float lampPdf(const Vertex& from, uint32_t lamp, const Vertex& lit) const;
-    std::optional<Vertex> vertexAt(const Hit& hit) const;
+    std::optional<Vertex> vertexAt(const Hit& hit, glm::vec3 direction) const;
     glm::vec3 areaLight(const Vertex& vertex, Path& path) const;
     glm::vec3 skyLight(const Vertex& vertex, Path& path) const;
     float areaPdf(const Vertex& vertex, uint32_t area_light, float distance_m, float cos_emitter) const;

@@ -401,8 +401,11 @@ class Expansion {
         const std::vector<TermReport> reports = activity_.thresholds(out_, lingering_threshold_max);
         out_.bounced = {};
         least_.resize(terms_);
+        // Of a group that has ended nothing is decided again, however long others go on: alone it would be the same.
         for (uint32_t t = first ? 0 : paths_.groupCount(); t < terms_; ++t)
-            least_[t] = (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
+            if (runs(t))
+                least_[t] =
+                    (t < paths_.groupCount() ? lingering_share : door_lingering_share) * reports[t].threshold_lux;
     }
 
     const Gatherer& gatherer_;

@@ -12,7 +12,7 @@ namespace dimmer::cook {
 
 // Whether light is stored of a term: always-on light over free paths is. Lit directly counts once it matters as much as
 // the threshold asks of indirect light: a lamp without range lights everything in sight a little.
-// `always_on_lux`: what is there of always-on light with all doors closed.
+// `always_on_lux`: what is there of the group's light with all doors closed.
 bool isActive(const TermReport& report, uint32_t term, float direct_lux, float bounced_lux, float always_on_lux);
 
 struct Series {
@@ -25,13 +25,15 @@ struct Series {
     std::vector<DoorIndices> doors_near;  // pairs of one another; see doorsNear() (bake/door_pairs.h)
     std::vector<TermReport> reports;      // per term
     std::vector<float> threshold_base;    // lux per term: what its threshold is a share of
+    std::vector<uint32_t> group_of;       // per term: its light group, and the group's term over free paths
     std::vector<uint32_t> bounces;        // per light group
     uint64_t rays = 0;
 
     bool active(uint32_t term, float direct_lux, float bounced_lux, float always_on_lux) const {
         return isActive(reports[term], term, direct_lux, bounced_lux, always_on_lux);
     }
-    float alwaysOnLux(size_t receiver) const;
+    // What the term is seen beside, where it is always-on light through doors; otherwise 0.
+    float alwaysOnLux(size_t receiver, uint32_t term) const;
     // The largest threshold (BakeSettings) at which the term stays active at the receiver.
     float keepUpTo(size_t receiver, uint32_t term) const;
     // Ascending: always-on light over free paths, then what is active at the receiver.

@@ -20,6 +20,9 @@ namespace {
 // Rays and shadow rays start this far off the surface (liftOff()): above the rounding of coordinates at 100 m (8e-6 m)
 // and the mismatch of coplanar pieces, below any gap that matters.
 constexpr float lift_m = 5e-4f;
+// What stands between a surface and the point covers it, but for pieces in the surface's plane: about parallel to it,
+// and below so much of the lift.
+constexpr float in_plane_share = 0.3f, in_plane_cosine = 0.999f;
 // How many Halton points are tried before a texel counts as a sliver.
 constexpr uint32_t halton_tries = 64;
 constexpr uint32_t inside_test_rays = 16;
@@ -36,6 +39,10 @@ constexpr float steps_per_texel = TexelPoint::steps;
 // Receivers within such a cell stand in the order of their page; a level has at most so many along an axis.
 constexpr float cell_m = 1, cells_max = (1 << 21) - 1;
 
+// A face that ends where a texel does reaches into the next by rounding. Where that is all, what pads the chart is
+// better than light at the face's very edge.
+constexpr float rounded_share = 1e-3f;
+
 struct Covered {
     uint64_t texel;  // index over all pages
     uint32_t face;
@@ -47,10 +54,16 @@ std::vector<Covered> coverConservatively(const Unwrap& unwrap) {
     tbb::parallel_for(size_t{0}, unwrap.faces.size(), [&](size_t face) {
         const auto& uv = unwrap.uv_texels[face];
         const uint64_t page = uint64_t{unwrap.charts[unwrap.face_chart[face]].page} * unwrap.page_height;
+        std::vector<float> areas;
         forEachCellNear(uv, {unwrap.page_width, unwrap.page_height}, [&](uint32_t x, uint32_t y) {
-            if (polygonArea(clipToCell(uv, x, y)) > 1e-6f)
-                parts[face].push_back({(page + y) * unwrap.page_width + x, static_cast<uint32_t>(face)});
+            const float area = polygonArea(clipToCell(uv, x, y));
+            if (!(area > 1e-6f)) return;
+            parts[face].push_back({(page + y) * unwrap.page_width + x, static_cast<uint32_t>(face)});
+            areas.push_back(area);
         });
+        const float least = areas.empty() ? 0 : rounded_share * std::ranges::max(areas);
+        size_t i = 0;
+        std::erase_if(parts[face], [&](const Covered&) { return areas[i++] < least; });
     });
     std::vector<Covered> all;
     for (auto& part : parts) all.insert(all.end(), part.begin(), part.end());
@@ -189,7 +202,8 @@ class TexelSampler {
         addReflectance(texel, p, usable, result);
         ++usable.tried;
         const auto nearest = [&](glm::vec3 direction) { return rays_.nearest(position, direction, far_away_m, 0); };
-        const Side side = sideOf({position, p.face}, Surfaces::All, nearest);
+        const Side side =
+            isCovered(p, position, Surfaces::All) ? Side::In : sideOf({position, p.face}, Surfaces::All, nearest);
         if (side == Side::Doubtful) usable.doubtful.push_back(p);
         if (side != Side::In) {
             const auto [closed, open] = behindLeaf(p, position);
@@ -201,9 +215,20 @@ class TexelSampler {
         }
         ++usable.dropped;
         const auto stays = [&](glm::vec3 direction) { return nearestWithout(triangle, position, direction); };
-        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ &&
+        if (rays_.anyLeaf() && usable.in_leaf.size() < samples_max_ && !isCovered(p, position, Surfaces::Walls) &&
             sideOf({position, p.face}, Surfaces::Walls, stays) != Side::In)
             usable.in_leaf.push_back(p);
+    }
+
+    // Where two surfaces meet at an acute angle, as floor and roof at eaves do, a point lifted off the one is beyond
+    // the other, in whatever light is there.
+    bool isCovered(const TexelPoint& p, glm::vec3 position, Surfaces surfaces) const {
+        const glm::vec3 normal = unwrap_.frames[p.face].normal;
+        const float way_m = liftOff(position, lift_m) - liftOff(position, 0);
+        const auto hit = rays_.nearest(position, -normal, way_m, 0, surfaces);
+        if (!hit || rays_.alphaAt(hit->triangle, hit->u, hit->v) < 1) return false;
+        const float cosine = glm::dot(normal, rays_.triangles()[hit->triangle].normal);
+        return hit->distance_m < (1 - in_plane_share) * way_m || std::abs(cosine) < in_plane_cosine;
     }
 
     // Of one that stands closed, and of one that stands open. The gap behind a leaf that hangs in front of its opening

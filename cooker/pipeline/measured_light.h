@@ -26,8 +26,9 @@ Measured measure(const ReferenceTracer& tracer, std::span<const ReferencePoint> 
 
 std::vector<LightPair> pairsOf(std::span<const double> values, std::span<const ReferenceEstimate> estimates);
 
-// A place on a surface inside of something closed: a good part of what the point sees are backs. Half would do in the
-// middle of it, but where a wall meets a floor inside, half of the rays end on the floor's front.
+// A place on a surface that something lies on, or inside of something closed: a good part of what the point sees are
+// backs. Half would do in the middle of it, but where a wall meets a floor inside, half of the rays end on the floor's
+// front.
 bool hidden(const RayScene& rays, glm::vec3 position_m, const TangentFrame& frame, uint32_t seed);
 
 }  // namespace dimmer::cook

@@ -65,11 +65,15 @@ std::vector<std::vector<ProbeTermLight>> fitTerms(const Series& series, const Mo
     tbb::parallel_for(size_t{0}, terms.size(), [&](size_t t) { light[t] = fitted(model, terms[t]); });
     std::vector<std::vector<ProbeTermLight>> rows(model.at_probes.size());
     for (size_t i = 0; i < rows.size(); ++i) {
-        float always_on_lux = 0;  // the first of the terms
+        const auto luxOf = [&](uint32_t term) {
+            const auto at = std::ranges::lower_bound(terms, term);
+            return at != terms.end() && *at == term
+                       ? luminance(light[static_cast<size_t>(at - terms.begin())][i].irradiance())
+                       : 0.0f;
+        };
         for (size_t t = 0; t < terms.size(); ++t) {
-            const float lux = luminance(light[t][i].irradiance());
-            if (terms[t] == always_group) always_on_lux = lux;
-            if (terms[t] == always_group || series.active(terms[t], 0, lux, always_on_lux))
+            const float always_on_lux = luxOf(series.group_of[terms[t]]);
+            if (terms[t] == always_group || series.active(terms[t], 0, luxOf(terms[t]), always_on_lux))
                 rows[i].push_back({terms[t], light[t][i], 0, 0});
         }
     }

@@ -27,7 +27,8 @@ ReceiverGather<Light>::ReceiverGather(const Gatherer& gatherer, const LightGrid&
       final_(gatherer_),
       sum_(gatherer_.paths().termCount()),
       direct_(gatherer_.paths().termCount()),
-      stored_(gatherer_.paths().termCount()) {
+      stored_(gatherer_.paths().termCount()),
+      free_lux_(groups.size()) {
     if (std::is_same_v<Light, ProbeLight>) options_.rays_max *= rays_per_texel_ray;
     for (uint32_t t = 0; t < gatherer_.paths().termCount(); ++t) {
         const uint32_t group = gatherer_.paths().terms()[t].group;
@@ -63,14 +64,14 @@ uint64_t ReceiverGather<Light>::findActive(const GatherFrom& from) {
         if (luminance(sum_[t].irradiance()) > 0) bounced_.push_back(t);
     std::ranges::sort(bounced_);
     active_.assign(1, always_group);
-    float always_on_lux = 0;
+    std::ranges::fill(free_lux_, 0.0f);
     for (auto* light : {&direct_, &sum_})
-        if (!light->touched().empty() && light->touched()[0] == always_group)
-            always_on_lux += luminance((*light)[always_group].irradiance());
+        for (const uint32_t t : light->touched())
+            if (t < free_lux_.size()) free_lux_[t] += luminance((*light)[t].irradiance());
     for (auto* light : {&direct_, &sum_}) {
         for (const uint32_t t : light->touched()) {
             const float lux = luminance((*light)[t].irradiance());
-            if (t != always_group && series_.active(t, 0, lux, always_on_lux)) active_.push_back(t);
+            if (t != always_group && series_.active(t, 0, lux, free_lux_[series_.group_of[t]])) active_.push_back(t);
         }
         light->clear();
     }

@@ -37,6 +37,7 @@ class ReceiverGather {
     FinalGatherOptions options_;
     FinalGather<Light> final_;
     TermAccumulator<Light> sum_, direct_, stored_;
+    std::vector<float> free_lux_;             // per light group, of what comes with all doors closed
     std::vector<uint32_t> active_, bounced_;  // terms; of the latter, light came from surfaces
 };
 

@@ -32,6 +32,7 @@ class PlaceTrace {
           direct_(gatherer.paths().termCount()),
           full_(gatherer.paths().termCount()),
           first_half_lux_(gatherer.paths().termCount()),
+          free_lux_(gatherer.paths().groupCount()),
           wanted_in_group_(gatherer.paths().groupCount()) {
         for (uint32_t t = 0; t < gatherer.paths().termCount(); ++t) {
             const uint32_t group = gatherer.paths().terms()[t].group;
@@ -69,7 +70,7 @@ class PlaceTrace {
         for (const uint32_t t : direct_.touched())
             if (sum_.wants(t)) sum_[t];
         row.reserve(sum_.touched().size());
-        float always_on_lux = 0;  // the first term, of those that ascend
+        std::ranges::fill(free_lux_, 0.0f);  // the first terms, of those that ascend
         for (const uint32_t t : sum_.touched()) {
             if (!sum_.wants(t)) continue;
             ProbeLight light = sum_[t] * 0.5f;  // of two halves
@@ -78,8 +79,9 @@ class PlaceTrace {
             light += full_[t];
             const float lux = luminance(light.irradiance());
             const float direct_lux = luminance(direct_[t].irradiance());
-            if (t == always_group) always_on_lux = lux + direct_lux;
-            if (isActive(reports_[t], t, direct_lux, lux, always_on_lux)) row.push_back({t, light, off * off, 0});
+            if (t < free_lux_.size()) free_lux_[t] = lux + direct_lux;
+            if (isActive(reports_[t], t, direct_lux, lux, free_lux_[gatherer_.paths().group(t)]))
+                row.push_back({t, light, off * off, 0});
         }
         sum_.clear();
         direct_.clear();
@@ -95,6 +97,7 @@ class PlaceTrace {
     const BakeSettings& settings_;
     TermAccumulator<ProbeLight> sum_, direct_, full_;  // the last: direct light of lamps that are baked in full
     std::vector<float> first_half_lux_;                // per term, of what rays found; 0 between places
+    std::vector<float> free_lux_;                      // per light group, with all doors closed
     std::vector<uint32_t> wanted_in_group_;
 };
 

@@ -66,6 +66,9 @@ Expected<void> checkOptions(const RuntimeOptions& options) {
     if (options.buffering > Buffering::Double)
         return fail(ErrorCode::InvalidArgument,
                     fmt::format("{} is no Buffering.", static_cast<int>(options.buffering)));
+    if (options.moving_probes_max > moving_probes_limit)
+        return fail(ErrorCode::InvalidArgument, fmt::format("moving_probes_max is {}; {} are the most.",
+                                                            options.moving_probes_max, moving_probes_limit));
     return {};
 }
 

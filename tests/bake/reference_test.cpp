@@ -270,6 +270,22 @@ TEST(Reference, BacksBlockAndOnlyDoubleSidedOnesReflect) {
     EXPECT_EQ(trace(scene, {0, 2.5f, 0}, {0, -1, 0}, 2000).irradiance_lux, glm::vec3(0));
 }
 
+// Nothing of the sun gets into a sealed attic. Lifted straight off its floor, paths near the eaves would be beyond the
+// roof.
+TEST(Reference, NoSunComesThroughEaves) {
+    Scene scene;
+    addAttic(scene, 3, 2, 0.35f, addMaterial(scene, lambert(0.8f)));
+    PunctualLight sun;
+    sun.type = LightType::Directional;
+    sun.direction = {0, -1, 0};
+    sun.intensity = glm::vec3(1e5f);
+    scene.lights.push_back(sun);
+    const RayScene rays(scene);
+    const ReferenceTracer tracer(rays, {});
+    for (const float x : {2.9f, 2.5f, -2.7f})
+        EXPECT_EQ(tracer.irradiance({{x, 0, 0.1f}, up, up}, 1 << 16).irradiance_lux, glm::vec3(0)) << x;
+}
+
 TEST(Reference, WeightsScaleEverySetAlone) {
     Scene scene;
     addBox(scene, glm::vec3(1), addMaterial(scene, lambert(0.5f)));

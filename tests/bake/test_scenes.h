@@ -121,6 +121,29 @@ inline PunctualLight& addPointLight(Scene& scene, glm::vec3 position_m, float ca
     return scene.lights.back();
 }
 
+// A roof of two slopes on a floor, sealed, all facing inwards: eaves at x = -half and half, from z = -length to length.
+inline void addAttic(Scene& scene, float half, float length, float slope_rad, uint32_t material) {
+    const float ridge = half * std::tan(slope_rad);
+    const auto add = [&](const char* node, std::vector<glm::vec3> corners) {
+        SceneMesh mesh;
+        mesh.node = node;
+        mesh.lighting = Lighting::Lightmap;
+        const glm::vec3 normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
+        mesh.normals.assign(corners.size(), normal);
+        for (uint32_t i = 2; i < corners.size(); ++i) {
+            mesh.triangles.emplace_back(0, i - 1, i);
+            mesh.triangle_materials.push_back(material);
+        }
+        mesh.positions_m = std::move(corners);
+        scene.meshes.push_back(std::move(mesh));
+    };
+    add("floor", {{-half, 0, -length}, {-half, 0, length}, {half, 0, length}, {half, 0, -length}});
+    add("west slope", {{-half, 0, -length}, {0, ridge, -length}, {0, ridge, length}, {-half, 0, length}});
+    add("east slope", {{half, 0, -length}, {half, 0, length}, {0, ridge, length}, {0, ridge, -length}});
+    add("north gable", {{-half, 0, -length}, {half, 0, -length}, {0, ridge, -length}});
+    add("south gable", {{half, 0, length}, {-half, 0, length}, {0, ridge, length}});
+}
+
 // A corridor of four rooms of 2 m in a row along x, parted by doors that fill it from wall to wall; two light sets and
 // a little always-on light.
 inline Scene corridorWithDoors() {

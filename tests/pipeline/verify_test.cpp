@@ -3,6 +3,7 @@
 #include <format/texel.h>
 #include <pipeline/cooked_level.h>
 #include <pipeline/heat_map.h>
+#include <pipeline/measured_light.h>
 #include <pipeline/verify.h>
 #include <scene/level_file.h>
 
@@ -162,6 +163,52 @@ TEST(Verify, AWrongPackIsFoundWrong) {
 }
 
 // The standard error falls with the root of the paths: a sixteenth of them, four times the noise.
+// A black hall with a hole of 10 cm in its ceiling, under a sky: one path in some 3,000 finds it. That none of the
+// first did is no darkness where a pack has light; where it has none either they are enough.
+TEST(MeasuredLight, WhatNoPathFoundYetIsNotKnown) {
+    Scene scene;
+    scene.sky_radiance_cd_m2 = glm::vec3(10000);
+    const uint32_t black = addMaterial(scene, lambert(0));
+    addFloor(scene, 4, black);
+    for (const float side : {-1.0f, 1.0f}) {
+        addQuad(scene, "wall", {side * 4, 1.5f, 0}, {0, 1.5f, 0}, {0, 0, -side * 4}, black);
+        addQuad(scene, "wall", {0, 1.5f, side * 4}, {0, 1.5f, 0}, {side * 4, 0, 0}, black);
+        addQuad(scene, "ceiling", {side * 2.025f, 3, 0}, {1.975f, 0, 0}, {0, 0, 4}, black);
+        addQuad(scene, "ceiling", {0, 3, side * 2.025f}, {0.05f, 0, 0}, {0, 0, 1.975f}, black);
+    }
+    const RayScene rays(scene);
+    const ReferenceTracer tracer(rays, {});
+    const std::vector<ReferencePoint> points(2, {{0.4f, 0, 0.3f}, {0, 1, 0}, {0, 1, 0}});
+    // The hole is small beside its distance d: L A cos^2 / d^2.
+    const double d2 = 9 + 0.25, expected = 10000 * 0.01 * (9 / d2) / d2;
+    const std::array<double, 2> of_pack{expected, 0};
+    constexpr uint32_t most = 1 << 18;
+    SilentProgress progress;
+    const Measured m = measure(tracer, points, of_pack, 0.01 * expected, most, progress);
+    EXPECT_EQ(m.estimates[0].paths(), most);
+    const ReferenceValue found = m.estimates[0].value();
+    EXPECT_NEAR(static_cast<double>(found.irradiance_lux.y), expected,
+                4 * static_cast<double>(found.standard_error_lux.y));
+    EXPECT_LT(static_cast<double>(found.standard_error_lux.y), 0.2 * expected);
+    EXPECT_LE(m.estimates[1].paths(), ReferenceTarget{}.paths_min);
+}
+
+// A floor under a sheet is no place to ask for light, however close that lies; in the floor's own plane it may be the
+// floor itself, in pieces that differ by rounding.
+TEST(MeasuredLight, BelowASheetIsHidden) {
+    for (const float height_m : {0.0f, 1e-4f, 3.5e-4f, 7e-4f}) {
+        Scene scene;
+        addFloor(scene, 1, addMaterial(scene, lambert(0.5f)));
+        Material paper = lambert(0.5f);
+        paper.double_sided = true;
+        addFloor(scene, 0.5f, addMaterial(scene, std::move(paper)), height_m);
+        const RayScene rays(scene);
+        const TangentFrame frame{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}};
+        EXPECT_EQ(hidden(rays, {0.1f, 0, 0.2f}, frame, 1), height_m > 3e-4f) << height_m;
+        EXPECT_FALSE(hidden(rays, {0.7f, 0, 0.2f}, frame, 1)) << height_m;
+    }
+}
+
 TEST(Verify, FewPathsAreFewForSetsToo) {
     const Scene scene = furnace();
     const auto pack = cooked(scene, "draft");

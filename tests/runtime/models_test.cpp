@@ -326,6 +326,14 @@ PackData wildPack(uint32_t seed, ColorFormat format) {
     return data;
 }
 
+TEST_F(GpuModels, MoreRoomThanThereIsIsRefused) {
+    const Pack pack = packOf(wildPack(7, ColorFormat::E5B9G9R9));
+    const auto refused = Runtime::create(device().context(), pack, {.moving_probes_max = moving_probes_limit + 1});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::InvalidArgument);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("16777216 are the most"));
+}
+
 // 160 models of 64 probes that wander while the light changes: 10,240 probes taken each time.
 TEST_F(GpuModels, AgreeWithTheCpuBitForBit) {
     for (const auto format : {ColorFormat::E5B9G9R9, ColorFormat::R11G11B10F})

@@ -19,7 +19,8 @@ struct TexelRecord;
 class CpuRuntime : public LightState {
    public:
     // `threads`: how many blend large updates, the caller's included, at most 1,024; the pages are the same whatever
-    // their number. `moving_probes_max`: as in RuntimeOptions.
+    // their number. `moving_probes_max`: as in RuntimeOptions,
+    // and no more than the limit whatever is asked.
     explicit CpuRuntime(const Pack& pack, uint32_t threads = 1, uint32_t moving_probes_max = 0);
     ~CpuRuntime();
     CpuRuntime(CpuRuntime&&) noexcept;

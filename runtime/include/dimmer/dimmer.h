@@ -234,7 +234,8 @@ typedef struct dimmer_model_grid {
     uint32_t counts[3];
 } dimmer_model_grid;
 
-/* Handles of removed models are refused, not mistaken for later ones. */
+/* Handles of models that the same lights removed are refused, not mistaken for later ones; other lights, or lights
+ * created anew, take a handle for what they numbered so themselves. */
 typedef struct dimmer_model {
     uint32_t index, generation;
 } dimmer_model;

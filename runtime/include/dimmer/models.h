@@ -26,10 +26,11 @@ struct ModelGrid {
 ModelGrid modelGrid(std::array<float, 3> min_m, std::array<float, 3> max_m, float spacing_m = 1.5f,
                     uint32_t probes_max = 64);
 
-// More than this a runtime keeps no room for, whatever it is asked: half a gigabyte of probes.
+// More than this no runtime has room for: half a gigabyte of probes.
 inline constexpr uint32_t moving_probes_limit = 1 << 24;
 
-// A model that was added. Handles of removed models are refused, not mistaken for later ones.
+// A model that was added to a runtime. Handles of models that this one removed are refused, not mistaken for later
+// ones; another runtime, or one made anew after DeviceLost, takes a handle for what it numbered so itself.
 struct Model {
     uint32_t index = 0, generation = 0;  // generations begin at 1: what was never added is no model
 };
