@@ -278,7 +278,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option(
         "--depfile", a->depfile,
         "write there what the pack is made from, in Make's syntax: level, buffers, images, light profiles, sky, "
-        "profiles");
+        "profiles; names that Make or Ninja would misread are refused");
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"
