@@ -202,6 +202,24 @@ int run(const CookArguments& a) {
 
 }  // namespace
 
+void removeOldCookJson(const CLI::App& app) {
+    const CLI::App* c = app.get_subcommand("cook");
+    const auto read = [&](const char* option, auto& value) {
+        if (c->count(option) > 0) value = c->get_option(option)->results().back();
+    };
+    CookArguments a;
+    read("LEVEL", a.options.level);
+    read("--output", a.options.pack);
+    read("--profile", a.options.profile);
+    read("--cache", a.options.cache);
+    read("--json", a.json);
+    read("--depfile", a.depfile);
+    read("--write-level", a.write_level);
+    read("--report", a.report);
+    if (a.json.empty()) return;
+    if (auto ok = removeOldJson(a, inputsOf(a)); !ok) reportError(ok.error());
+}
+
 void addCookCommand(CLI::App& app, int& exit_code) {
     auto a = std::make_shared<CookArguments>();
     auto* c = app.add_subcommand("cook", "Bake a level and write its pack");

@@ -120,6 +120,38 @@ TEST_F(CookJson, OfAnEarlierCookDoesNotOutliveAFailedOne) {
     EXPECT_TRUE(std::filesystem::is_symlink(file("link.json")));
 }
 
+TEST_F(CookJson, OfAnEarlierCookDoesNotOutliveAUsageError) {
+    const std::string figures = readText(file("cook.json")), level = file("level.gltf"), old = file("old.json");
+    const std::string new_pack = file("new.dimmer");
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{level, "-o", new_pack, "--json", old, "--quality", "ultra"},
+          {level, "--quality", "ultra", "--json", old, "-o", new_pack},
+          {level, "-o", new_pack, "--json=" + old, "--nonsense"},
+          {level, "--json", old},
+          {"--json", old, "-o", new_pack},
+          {level, "-o", new_pack, "--json", old, "--threads"}}) {
+        write("old.json", figures);
+        std::vector<std::string> all = {"cook"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        EXPECT_EQ(runDimmer(all).exit_code, 2);
+        EXPECT_FALSE(std::filesystem::exists(old)) << testing::PrintToString(arguments);
+    }
+    // Neither by another command, by one that asks for help, nor what is an input, another output or no figures.
+    write("old.json", figures);
+    const std::string notes = write("notes.json", "mine");
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"inspect", pack(), "--json", old, "--nonsense"},
+          {"cook", level, "--json", old, "--help"},
+          {"cook", old, "-o", new_pack, "--json", old, "--nonsense"},
+          {"cook", level, "-o", new_pack, "--profile", old, "--json", old, "--nonsense"},
+          {"cook", level, "-o", old, "--json", old, "--nonsense"},
+          {"cook", level, "-o", new_pack, "--json", notes, "--nonsense"}}) {
+        runDimmer(arguments);
+        EXPECT_EQ(readText(old), figures) << testing::PrintToString(arguments);
+    }
+    EXPECT_EQ(readText(notes), "mine");
+}
+
 TEST_F(CookJson, AFailedCookRemovesNothingElse) {
     for (const std::string& text : {std::string("notes"), std::string(R"({"result": "mine", "seconds": 1})"),
                                     std::string(100000, '[') + std::string(100000, ']')}) {
