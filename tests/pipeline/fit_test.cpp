@@ -404,6 +404,18 @@ TEST(LocalGridBudget, TakesFromTheLargest) {
     EXPECT_TRUE(remedies(pack, cost, profile, {}).empty());
 }
 
+// A limit that none is above changes nothing: no reason to cook again.
+TEST(LocalGridBudget, TakesNothingFromTheSmallest) {
+    PackData pack;
+    for (int i = 0; i < 2; ++i) pack.probes.local.emplace_back().counts = {2, 2, 2};
+    pack.probes.base.resize(16);
+    Profile profile;
+    profile.budget_local_grids = 12 * 28;
+    ASSERT_FALSE(checkBudgets(pack, costOf(pack), profile));
+    EXPECT_TRUE(fittingRemedy(pack, costOf(pack), profile, {}).changes.empty());
+    EXPECT_TRUE(remedies(pack, costOf(pack), profile, {}).empty());
+}
+
 TEST_F(Fit, OneElement) {
     const auto whole = run("", false);
     ASSERT_TRUE(whole.has_value());
