@@ -23,6 +23,8 @@
 namespace dimmer::cook {
 namespace {
 
+constexpr uint32_t threads_max = 1024;  // as the runtime's; millions are more than there is memory for
+
 struct CookArguments {
     CookOptions options;
     std::string json, depfile;
@@ -239,6 +241,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->expected(1)
         ->take_all();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
+        ->check(CLI::Range(0u, threads_max))
         ->capture_default_str();
     c->add_flag(
         "--suggest-combinations", a->suggest_combinations,
