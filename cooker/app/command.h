@@ -33,6 +33,10 @@ void addExportCommand(CLI::App& app, int& exit_code);
 void addReportCommand(CLI::App& app, int& exit_code);
 void addStressCommand(CLI::App& app, int& exit_code);
 
+// After a usage error, which ends a cook before it looks at its files: what an earlier one wrote to --json goes, as far
+// as the command line was understood.
+void removeOldCookJson(const CLI::App& app);
+
 // Prints the message to stderr; the exit code that belongs to it.
 int reportError(const Error& error);
 int exitCodeOf(ErrorCode code);

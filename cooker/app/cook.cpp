@@ -23,6 +23,8 @@
 namespace dimmer::cook {
 namespace {
 
+constexpr uint32_t threads_max = 1024;  // as the runtime's; millions are more than there is memory for
+
 struct CookArguments {
     CookOptions options;
     std::string json, depfile;
@@ -202,6 +204,24 @@ int run(const CookArguments& a) {
 
 }  // namespace
 
+void removeOldCookJson(const CLI::App& app) {
+    const CLI::App* c = app.get_subcommand("cook");
+    const auto read = [&](const char* option, auto& value) {
+        if (c->count(option) > 0) value = c->get_option(option)->results().back();
+    };
+    CookArguments a;
+    read("LEVEL", a.options.level);
+    read("--output", a.options.pack);
+    read("--profile", a.options.profile);
+    read("--cache", a.options.cache);
+    read("--json", a.json);
+    read("--depfile", a.depfile);
+    read("--write-level", a.write_level);
+    read("--report", a.report);
+    if (a.json.empty()) return;
+    if (auto ok = removeOldJson(a, inputsOf(a)); !ok) reportError(ok.error());
+}
+
 void addCookCommand(CLI::App& app, int& exit_code) {
     auto a = std::make_shared<CookArguments>();
     auto* c = app.add_subcommand("cook", "Bake a level and write its pack");
@@ -221,6 +241,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
         ->expected(1)
         ->take_all();
     c->add_option("--threads", a->options.threads, "worker threads, 0 for all; the result does not depend on it")
+        ->check(CLI::Range(0u, threads_max))
         ->capture_default_str();
     c->add_flag(
         "--suggest-combinations", a->suggest_combinations,
@@ -278,7 +299,7 @@ void addCookCommand(CLI::App& app, int& exit_code) {
     c->add_option(
         "--depfile", a->depfile,
         "write there what the pack is made from, in Make's syntax: level, buffers, images, light profiles, sky, "
-        "profiles");
+        "profiles; names that Make or Ninja would misread are refused");
     c->footer(
         "Progress and warnings go to stderr, the table of bytes per category and element to stdout. Over the "
         "profile's\n"

@@ -72,7 +72,7 @@ Json cookJson(Verdict verdict, const CookOptions& options, const std::vector<std
                  {"quality", options.quality}};
     auto& files = json["inputs"] = Json::array();
     for (const auto& input : inputs) files.push_back(input.string());
-    if (cooked) json["pack_id"] = packId(options.pack);
+    if (cooked) json["pack_id"] = packId(result.header_hash);
     addTimes(result.stats, json);
     if (cooked) json["file_bytes"] = result.file_bytes;
     json["bytes"] = bytesJson(cost, cooked ? std::optional(result.file_bytes) : std::nullopt);

@@ -56,6 +56,7 @@ int endOfParsing(const CLI::App& app, const CLI::ParseError& error) {
     using namespace dimmer::cook;
     if (error.get_exit_code() == 0) return checkOutput(app.exit(error));
     sayMessage(fmt::format("error: {}\n`dimmer COMMAND --help` explains a command", error.what()));
+    removeOldCookJson(app);
     return exit_bad_input;
 }
 

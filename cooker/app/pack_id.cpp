@@ -11,7 +11,11 @@ std::string packId(const std::filesystem::path& pack) {
     format::Header header{};
     std::ifstream in(pack, std::ios::binary);
     if (!in.read(reinterpret_cast<char*>(&header), sizeof(header))) return "";
-    return fmt::format("{:016x}", header.xxh64);
+    return packId(header.xxh64);
+}
+
+std::string packId(uint64_t header_hash) {
+    return fmt::format("{:016x}", header_hash);
 }
 
 }  // namespace dimmer::cook

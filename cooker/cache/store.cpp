@@ -50,11 +50,13 @@ struct EntryHeader {
 };
 constexpr std::array<char, 8> entry_magic = {'D', 'I', 'M', 'C', 'A', 'C', 'H', '2'};
 
-// Nothing where there is no such file: a folder opens, and claims to be without end.
+// Nothing where there is no such file: a folder opens, and claims to be without end; a pipe is waited for to be opened
+// by somebody else.
 std::optional<std::vector<std::byte>> readFile(const fs::path& path) {
     std::error_code ignored;
+    if (!fs::is_regular_file(path, ignored)) return std::nullopt;
     std::ifstream file(path, std::ios::binary | std::ios::ate);
-    if (!file || !fs::is_regular_file(path, ignored)) return std::nullopt;
+    if (!file) return std::nullopt;
     std::vector<std::byte> bytes(static_cast<size_t>(std::max<std::streamoff>(file.tellg(), 0)));
     file.seekg(0);
     file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
@@ -126,6 +128,11 @@ Entry CacheStore::find(std::string_view kind, const Key& key) const {
 Expected<void> CacheStore::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) const {
     // Not flushed: what a power cut leaves half written is found to be damaged.
     const std::string name = nameOf(kind, key);
+    // A pipe would be written to, and waited for; a folder fails by itself.
+    std::error_code ignored;
+    const auto there = fs::status(folder_ / name, ignored);
+    if (fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there))
+        return fail(ErrorCode::Io, fmt::format("{}: it is no file; remove it", (folder_ / name).string()));
     return writeFileAtomically(folder_ / name, encode(bytes, name), Flush::No);
 }
 

@@ -1,6 +1,7 @@
 // cook: a level's file in, a pack's file out.
 #include <pipeline/cook.h>
 
+#include <format/layout.h>
 #include <pipeline/cook_settings.h>
 #include <pipeline/cook_warnings.h>
 #include <pipeline/cook_within.h>
@@ -10,6 +11,8 @@
 #include <pack/pack_reader.h>
 #include <sys/resource.h>
 #include <tbb/global_control.h>
+
+#include <cstring>
 
 namespace dimmer::cook {
 namespace {
@@ -85,6 +88,12 @@ Expected<std::vector<std::byte>> findOrMakePack(const Scene& scene, const CookOp
     return bytes;
 }
 
+uint64_t headerHash(std::span<const std::byte> pack) {
+    format::Header header{};
+    std::memcpy(&header, pack.data(), sizeof(header));
+    return header.xxh64;
+}
+
 // A cache beside the pack may have taken the room that the pack needs.
 Expected<void> writePack(const CookOptions& options, std::span<const std::byte> bytes, CookCache* cache,
                          std::vector<std::string>& warnings) {
@@ -145,6 +154,7 @@ Expected<void> cookInto(CookResult& result, const CookOptions& options, Progress
     {
         const Stopwatch watch(result.stats.seconds["write"]);
         result.file_bytes = bytes->size();
+        result.header_hash = headerHash(*bytes);
         if (auto ok = writePack(options, *bytes, cache ? &*cache : nullptr, result.stats.warnings); !ok)
             return std::unexpected(ok.error());
     }

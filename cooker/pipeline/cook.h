@@ -61,6 +61,7 @@ struct CookResult {
     std::vector<Remedy> remedies;  // over budget: ways out
     bool grid_wanted = false;      // the global one, by profile and level
     uint64_t file_bytes = 0;
+    uint64_t header_hash = 0;  // of the file, see format::Header
     CookStats stats;
 };
 

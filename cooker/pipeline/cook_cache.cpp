@@ -35,7 +35,9 @@ void put(const Remedy& remedy, format::ByteWriter& out) {
     out.put(remedy.error);
     out.put(remedy.energy);
     out.putString(remedy.energy_of);
-    for (const bool flag : {remedy.fits, remedy.moves_light, remedy.texels}) out.put(static_cast<uint32_t>(flag));
+    for (const bool flag : {remedy.fits, remedy.moves_light, remedy.texels, remedy.grid_error.has_value()})
+        out.put(static_cast<uint32_t>(flag));
+    out.put(remedy.grid_error.value_or(0));
 }
 
 Remedy getRemedy(format::ByteReader& in) {
@@ -50,7 +52,11 @@ Remedy getRemedy(format::ByteReader& in) {
     remedy.error = in.get<double>();
     remedy.energy = in.get<double>();
     remedy.energy_of = in.getString();
-    for (bool* flag : {&remedy.fits, &remedy.moves_light, &remedy.texels}) *flag = in.get<uint32_t>() != 0;
+    bool grid_error_is_known = false;
+    for (bool* flag : {&remedy.fits, &remedy.moves_light, &remedy.texels, &grid_error_is_known})
+        *flag = in.get<uint32_t>() != 0;
+    const auto grid_error = in.get<double>();
+    if (grid_error_is_known) remedy.grid_error = grid_error;
     return remedy;
 }
 

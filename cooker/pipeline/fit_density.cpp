@@ -4,9 +4,10 @@
 namespace dimmer::cook {
 namespace {
 
-// What is predicted leaves this much room: records of texels were up to 4 % more than charts' areas say on large
-// levels, up to 18 % on one of two rooms.
-constexpr double density_margin = 0.92;
+// Records of texels were up to 4 % more than charts' areas say on large levels, up to 18 % on one of two rooms: they
+// are to take this share of their room. Pages are packed as a cook packs them, and need none to spare; as their sizes
+// go in steps, there may be none.
+constexpr double records_margin = 0.92;
 constexpr int density_steps_max = 14;  // of halving: to a thousandth
 
 // A budget that density helps with: what of it are pages, what goes with charts' texels, and what stays.
@@ -14,13 +15,12 @@ struct Share {
     uint64_t budget, pages, texels, stays;
 
     bool over() const { return budget > 0 && pages + texels + stays > budget; }
-    // Whether it fits with a little to spare, or, with `power` above 1, with more.
-    bool fitsWith(const LossTable::TexelsLeft& left, double power) const {
+    // Whether it fits with records at `margin` of their room; with `power` above 1, with more to spare.
+    bool fitsWith(const LossTable::TexelsLeft& left, double margin, double power) const {
         if (budget <= stays) return false;
-        const auto shrinking = static_cast<double>(pages + texels);
-        const double wanted = std::pow(density_margin * static_cast<double>(budget - stays) / shrinking, power);
-        return static_cast<double>(pages) * left.pages + static_cast<double>(texels) * left.charts <=
-               wanted * shrinking;
+        const uint64_t room = budget - stays;
+        const uint64_t wanted = scaledBytes(room, std::pow(ratio(room, pages + texels), power - 1));
+        return scaledBytes(pages, left.pages) + scaledBytes(texels, left.charts / margin) <= wanted;
     }
 };
 
@@ -50,12 +50,14 @@ Remedy byDensity(const PackCost& cost, const Profile& profile, const LossTable& 
     if (over.empty()) return remedy;
     // Where two steps fell short already, go further than it takes.
     const double power = 1 + 0.5 * static_cast<double>(std::max<size_t>(steps_before, 1) - 1);
+    double margin = records_margin;
     const auto enough = [&](double factor) {
         const LossTable::TexelsLeft left = losses.texelsLeft(factor);
-        return std::ranges::all_of(over, [&](const Share& s) { return s.fitsWith(left, power); });
+        return std::ranges::all_of(over, [&](const Share& s) { return s.fitsWith(left, margin, power); });
     };
     double too_little = 1, factor = density_factor_max;
     if (const auto least = losses.texelsLeft(factor); least.pages >= 1 && least.charts >= 1) return remedy;
+    if (!enough(factor)) margin = 1;
     remedy.fits = enough(factor) && !gridIsOver(cost, profile) && !localGridsAreOver(cost, profile);
     for (int step = 0; step < density_steps_max; ++step) {
         const double middle = std::sqrt(too_little * factor);

@@ -71,10 +71,10 @@ Remedy byLocalProbes(const PackData& pack, const PackCost& cost, const Profile& 
     };
     uint32_t to = local_probes_least;
     while (to < profile.local_probes_max && bytesAt(to + 1) <= profile.budget_local_grids) ++to;
-    if (to >= profile.local_probes_max) return remedy;
+    remedy.saves = cost.local_grids - std::min(cost.local_grids, bytesAt(to));
+    if (to >= profile.local_probes_max || remedy.saves == 0) return {};
     remedy.changes.push_back(
         {"grids.local_probes_max", static_cast<float>(profile.local_probes_max), static_cast<float>(to)});
-    remedy.saves = cost.local_grids - std::min(cost.local_grids, bytesAt(to));
     Profile others = profile;
     others.budget_local_grids = 0;
     remedy.fits =

@@ -32,7 +32,7 @@ TEST_F(Commands, HelpExplainsEachCommandWithUnitsAndAnExample) {
     EXPECT_THAT(overview.out, AllOf(HasSubstr("Exit codes: 0 done"), HasSubstr("3 over budget")));
     EXPECT_THAT(overview.err, IsEmpty());
     const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
-        {"cook", {"LEVEL", "--profile", "--quality", "--threads", "bytes", "metre", "=preview"}},
+        {"cook", {"LEVEL", "--profile", "--quality", "--threads", "[0 - 1024]", "bytes", "metre", "=preview"}},
         {"inspect", {"PACK", "--json", "--settings", "bytes"}},
         {"sample", {"PACK", "--points", "--state", "--backend", "lux", "metres", "cm"}},
         {"explain", {"PACK", "--point", "--normal", "metres", "cm", "lux", "bytes"}},
@@ -74,7 +74,8 @@ TEST_F(Commands, WrongUsage) {
     expectRefused(runDimmer({"inspect"}), {"PACK"});
     expectRefused(runDimmer({"inspect", pack(), "--nonsense"}), {"--nonsense"});
     expectRefused(runDimmer({"cook", file("level.gltf"), "-o", file("x"), "--quality", "best"}), {"best", "draft"});
-    expectRefused(runDimmer({"cook", file("level.gltf"), "-o", file("x"), "--threads", "-1"}), {"--threads"});
+    for (const char* threads : {"-1", "1025", "4294967295", "4294967296"})
+        expectRefused(runDimmer({"cook", file("level.gltf"), "-o", file("x"), "--threads", threads}), {"--threads"});
     expectRefused(runDimmer({"sample", pack(), "--points", "-", "--backend", "npu"}), {"npu", "cpu"});
     expectRefused(runDimmer({"bench", pack(), "--frames", "0"}), {"--frames"});
     EXPECT_FALSE(std::filesystem::exists(file("x")));

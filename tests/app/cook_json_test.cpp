@@ -1,6 +1,8 @@
 // What `cook --json` tells a pipeline, of packs that fit and of those that do not.
 #include <app/tool_fixture.h>
 #include <dimmer/version.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
 
 namespace dimmer::test {
 namespace {
@@ -38,6 +40,26 @@ TEST_F(CookJson, OfAPackSaysWhatInspectSays) {
         sum += figures["bytes"][part].get<uint64_t>();
     EXPECT_EQ(figures["bytes"]["device"], sum);
     EXPECT_EQ(figures["bytes"]["file"], std::filesystem::file_size(pack()));
+}
+
+// What goes into a pipe or nowhere is there only once.
+TEST_F(CookJson, NamesThePackThatWentElsewhere) {
+    const std::string bytes = readText(pack());
+    std::string id;  // docs/format.md: 8 bytes at 24, the lowest first
+    for (size_t i = 32; i-- > 24;) id += fmt::format("{:02x}", static_cast<unsigned char>(bytes.at(i)));
+    EXPECT_EQ(read(file("cook.json"))["pack_id"], id);
+    ASSERT_EQ(mkfifo(file("pipe").c_str(), 0600), 0);
+    // A cook that waits for a second reader is ended.
+    const auto piped = runProcess(
+        "/bin/sh", {"-c", "cat '" + file("pipe") + "' >'" + file("copy") + "' & exec timeout 60 \"$0\" \"$@\"",
+                    DIMMER_TOOL, "cook", file("level.gltf"), "-o", file("pipe"), "--profile", file("quick.json"),
+                    "--quality", "draft", "--json", file("piped.json")});
+    EXPECT_EQ(piped.exit_code, 0) << piped.err;
+    EXPECT_EQ(read(file("piped.json"))["pack_id"], id);
+    const auto nowhere = runDimmer({"cook", file("level.gltf"), "-o", "/dev/null", "--profile", file("quick.json"),
+                                    "--quality", "draft", "--json", "-"});
+    EXPECT_EQ(nowhere.exit_code, 0) << nowhere.err;
+    EXPECT_EQ(json::parse(nowhere.out, nullptr, false)["pack_id"], id);
 }
 
 // Cooked without the budgets, the pack has the very bytes that were too many.
@@ -96,6 +118,38 @@ TEST_F(CookJson, OfAnEarlierCookDoesNotOutliveAFailedOne) {
     EXPECT_EQ(cook("new.dimmer", {"--json", file("link.json")}, "none.gltf").exit_code, 2);
     EXPECT_FALSE(std::filesystem::exists(file("before.json")));
     EXPECT_TRUE(std::filesystem::is_symlink(file("link.json")));
+}
+
+TEST_F(CookJson, OfAnEarlierCookDoesNotOutliveAUsageError) {
+    const std::string figures = readText(file("cook.json")), level = file("level.gltf"), old = file("old.json");
+    const std::string new_pack = file("new.dimmer");
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{level, "-o", new_pack, "--json", old, "--quality", "ultra"},
+          {level, "--quality", "ultra", "--json", old, "-o", new_pack},
+          {level, "-o", new_pack, "--json=" + old, "--nonsense"},
+          {level, "--json", old},
+          {"--json", old, "-o", new_pack},
+          {level, "-o", new_pack, "--json", old, "--threads"}}) {
+        write("old.json", figures);
+        std::vector<std::string> all = {"cook"};
+        all.insert(all.end(), arguments.begin(), arguments.end());
+        EXPECT_EQ(runDimmer(all).exit_code, 2);
+        EXPECT_FALSE(std::filesystem::exists(old)) << testing::PrintToString(arguments);
+    }
+    // Neither by another command, by one that asks for help, nor what is an input, another output or no figures.
+    write("old.json", figures);
+    const std::string notes = write("notes.json", "mine");
+    for (const std::vector<std::string>& arguments :
+         {std::vector<std::string>{"inspect", pack(), "--json", old, "--nonsense"},
+          {"cook", level, "--json", old, "--help"},
+          {"cook", old, "-o", new_pack, "--json", old, "--nonsense"},
+          {"cook", level, "-o", new_pack, "--profile", old, "--json", old, "--nonsense"},
+          {"cook", level, "-o", old, "--json", old, "--nonsense"},
+          {"cook", level, "-o", new_pack, "--json", notes, "--nonsense"}}) {
+        runDimmer(arguments);
+        EXPECT_EQ(readText(old), figures) << testing::PrintToString(arguments);
+    }
+    EXPECT_EQ(readText(notes), "mine");
 }
 
 TEST_F(CookJson, AFailedCookRemovesNothingElse) {

@@ -10,14 +10,35 @@ using testing::HasSubstr;
 using Depfile = ToolTest;
 
 // By the manual of GNU make: "$$" is a dollar, a backslash keeps a space, a # or a colon from ending the name, and
-// backslashes before one are doubled.
+// backslashes before one are doubled. A % is a pattern's in targets alone.
 TEST(DepfileText, IsOfMakesSyntax) {
-    EXPECT_EQ(
-        cook::depfileText("out/a b.dimmer", {"level.gltf", "c#.png", "$d.ies", "c:e.bin", "f\\ g", "h\\i"}).value(),
-        "out/a\\ b.dimmer: level.gltf c\\#.png $$d.ies c\\:e.bin f\\\\\\ g h\\i\n");
-    const auto refused = cook::depfileText("pack", {"two\nlines.png"});
-    ASSERT_FALSE(refused);
-    EXPECT_THAT(refused.error().message, testing::AllOf(HasSubstr("--depfile: "), HasSubstr("line break")));
+    EXPECT_EQ(cook::depfileText("out/a b.dimmer",
+                                {"level.gltf", "c#.png", "$d.ies", "c:e.bin", "f\\ g", "h\\i", "5%.png", "w (1).png"})
+                  .value(),
+              "out/a\\ b.dimmer: level.gltf c\\#.png $$d.ies c\\:e.bin f\\\\\\ g h\\i 5%.png w\\ (1).png\n");
+}
+
+// GNU make 4.3 and Ninja 1.11 were asked what they make of these, as they are and behind a backslash.
+TEST(DepfileText, RefusesWhatMakeOrNinjaWouldMisread) {
+    const auto expectRefused = [](const auto& text, const std::string& what) {
+        ASSERT_FALSE(text) << what << *text;
+        EXPECT_EQ(text.error().code, ErrorCode::InvalidArgument);
+        EXPECT_THAT(text.error().message,
+                    testing::AllOf(HasSubstr("--depfile: "), HasSubstr(": the name has " + what)));
+        EXPECT_THAT(text.error().message, testing::Not(HasSubstr("\n")));
+    };
+    for (const char* c : {"=", ";", "\"", "'", "*", "?", "[", "&", "|", "<", ">", "^", "`"})
+        for (const std::string& name : {c + std::string("name"), std::string("na") + c + "me"}) {
+            expectRefused(cook::depfileText("pack", {"level.gltf", name}), std::string("a ") + c);
+            expectRefused(cook::depfileText(name, {"level.gltf"}), std::string("a ") + c);
+        }
+    expectRefused(cook::depfileText("5%", {"level.gltf"}), "a %");
+    expectRefused(cook::depfileText("pack", {"two\nlines.png"}), "a line break");
+    for (const char* name : {"a\tb", "a\rb", "\x1b[0m"})
+        expectRefused(cook::depfileText("pack", {name}), "a control character");
+    for (const char* name : {"dir\\", "a\\:b", "a\\#b", "a\\$b"})
+        expectRefused(cook::depfileText("pack", {name}), "a \\");
+    expectRefused(cook::depfileText("pack", {"wall(1)"}), "a (");
 }
 
 TEST_F(Depfile, ListsWhatIsThereOnce) {
@@ -56,7 +77,12 @@ TEST_F(Depfile, IsRefusedBeforeTheWork) {
     const auto result = cook("new.dimmer", {"--depfile", file("new.d")}, "level.gltf", "two\nlines.json");
     EXPECT_EQ(result.exit_code, 2);
     EXPECT_THAT(result.err, HasSubstr("line break"));
-    for (const char* name : {"new.dimmer", "new.d"}) EXPECT_FALSE(std::filesystem::exists(file(name))) << name;
+    const auto equals = cook("new=.dimmer", {"--depfile", file("new.d")});
+    EXPECT_EQ(equals.exit_code, 2);
+    EXPECT_THAT(equals.err,
+                testing::AllOf(HasSubstr("new=.dimmer: the name has a =, "), testing::Not(HasSubstr("charts"))));
+    for (const char* name : {"new.dimmer", "new=.dimmer", "new.d"})
+        EXPECT_FALSE(std::filesystem::exists(file(name))) << name;
 }
 
 }  // namespace

@@ -3,8 +3,13 @@
 #include <gmock/gmock.h>
 #include <pipeline/small_level.h>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <fstream>
+#include <future>
 #include <thread>
 
 namespace dimmer::cook::test {
@@ -75,6 +80,33 @@ TEST(CacheStore, AnEntryUnderAnothersNameIsNone) {
     EXPECT_EQ(store->find("light", keyOf(1)).find, Find::Hit);
     std::filesystem::create_directory(file(0));
     EXPECT_EQ(store->find("light", keyOf(0)).find, Find::Missing);
+}
+
+// Opened, a pipe keeps one waiting for its other end. Here that comes after a while, lest the test wait as well.
+TEST(CacheStore, APipeIsNoEntryAndNoPlaceForOne) {
+    const TemporaryFolder folder;
+    const auto store = CacheStore::open(folder.path);
+    ASSERT_TRUE(store);
+    const auto pipe = folder.path / CacheStore::nameOf("light", keyOf(1));
+    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+    const auto endsByItself = [&](auto&& work, int other_end) {
+        auto done = std::async(std::launch::async, work);
+        const bool in_time = done.wait_for(std::chrono::seconds(10)) == std::future_status::ready;
+        if (in_time) return true;
+        const int end = open(pipe.c_str(), other_end | O_NONBLOCK);
+        done.wait();
+        close(end);
+        return false;
+    };
+    Find found = Find::Hit;
+    EXPECT_TRUE(endsByItself([&] { found = store->find("light", keyOf(1)).find; }, O_WRONLY));
+    EXPECT_EQ(found, Find::Missing);
+    Expected<void> kept;
+    EXPECT_TRUE(endsByItself([&] { kept = store->keep("light", keyOf(1), bytesOf("light of one")); }, O_RDONLY));
+    ASSERT_FALSE(kept);
+    EXPECT_THAT(kept.error().message, testing::HasSubstr(pipe.string()));
+    EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+    EXPECT_THAT(store->trim(0), testing::IsEmpty());
 }
 
 // A pack that lists what is not an entry of the folder touches nothing.
