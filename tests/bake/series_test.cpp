@@ -119,42 +119,6 @@ TEST(Series, FewReceiversSendTheFaintLightOfAll) {
     EXPECT_NEAR(sums[1], sums[0], 3 * std::sqrt(variance) + 0.01 * sums[0]);
 }
 
-// A cache keeps each group's light by itself: alone a group's must be what it is beside others, however long those are
-// followed, and whatever else is always on. The white sphere's takes many rounds more than the corridor's.
-TEST(Series, OfAGroupIsTheSameWhicheverOthersGoOn) {
-    Scene scene = corridorWithDoors();
-    scene.light_sets = {{.name = "lamp", .always_on = true}, {.name = "sphere"}};
-    scene.lights[1].position_m = {-2.5f, 0, 0};
-    scene.lights[1].light_set.reset();
-    addSphere(scene, 2, 16, 8, addMaterial(scene, lambert(0.99f)));
-    for (glm::vec3& p : scene.meshes.back().positions_m) p.x += 20;
-    addPointLight(scene, {20, 0, 0}, 50, BakeMode::Indirect).light_set = 1;
-    GatheredLevel level(scene);
-    SilentProgress quiet;
-    const BakeSettings settings{.bounces_max = 150, .threshold = 0.03f};
-    const Series all = expandSeries(level.gatherer, LightGrid(*level.b.rays), settings, quiet);
-    constexpr uint32_t lamp = 1;
-    const Series alone =
-        expandSeries(level.gatherer, LightGrid(*level.b.rays), settings, quiet, std::vector<uint8_t>{0, 1, 0});
-    // What is let go is decided at powers of two.
-    EXPECT_LT(all.bounces[lamp], 128u);
-    EXPECT_GT(all.bounces[2], 128u);
-    EXPECT_EQ(all.bounces[lamp], alone.bounces[lamp]);
-    size_t through_doors = 0;
-    const auto ofLamp = [&](const Series& series, size_t i) {
-        std::vector<std::pair<uint32_t, glm::vec3>> light;
-        std::vector<uint32_t> active;
-        series.activeTerms(i, active);
-        for (const TermLight& l : series.bounced.row(i))
-            if (level.paths.group(l.term) == lamp) light.emplace_back(l.term, l.value());
-        for (const uint32_t t : active)
-            if (level.paths.group(t) == lamp) light.emplace_back(t, glm::vec3(-1)), through_doors += t > 2;
-        return light;
-    };
-    for (size_t i = 0; i < level.gatherer.receiverCount(); ++i) ASSERT_EQ(ofLamp(all, i), ofLamp(alone, i)) << i;
-    EXPECT_GT(through_doors, 100u);
-}
-
 // Always-on light is asked for everywhere; where there is none it costs no rays.
 TEST(Series, ALevelWithoutAlwaysOnLightTracesNoMoreRays) {
     uint64_t rays[2];

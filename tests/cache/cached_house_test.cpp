@@ -6,6 +6,7 @@
 #include <pipeline/cook_settings.h>
 #include <pipeline/small_level.h>
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 
@@ -16,6 +17,8 @@ struct CachedHouse : testing::Test {
     const TemporaryFolder folder;
     const std::filesystem::path levels = std::filesystem::path(DIMMER_SOURCE_DIR) / "game_sample/levels";
     json house = json::parse(std::ifstream(levels / "house.gltf"));
+    std::vector<std::string> settings = {"lightmaps.texels_per_metre=3", "bake.draft.rays=64",
+                                         "bake.draft.probe_sites=4"};
 
     CachedHouse() { std::filesystem::copy(levels / "house.bin", folder.path / "house.bin"); }
 
@@ -25,7 +28,7 @@ struct CachedHouse : testing::Test {
         CookOptions options{.level = writeText(folder, "house.gltf", house.dump()),
                             .pack = folder.path / "house.dimmer",
                             .quality = "draft",
-                            .set = {"lightmaps.texels_per_metre=3", "bake.draft.rays=64", "bake.draft.probe_sites=4"}};
+                            .set = settings};
         if (with_cache) options.cache = folder.path / "cache";
         const auto result = cook(options, silent);
         EXPECT_TRUE(result.has_value()) << result.error().message;
@@ -46,6 +49,19 @@ TEST_F(CachedHouse, AMovedLampIsBakedAsBesideAllOthers) {
         x = x.get<double>() + 0.05;
         EXPECT_TRUE(cooked(true) == cooked(false)) << lamp;
     }
+}
+
+// Apart from the sky, the sun is a group of its own: its light ends before that of others does, and comes through doors
+// into rooms that the sky lights anyhow.
+TEST_F(CachedHouse, ATurnedSunIsBakedAsBesideAllOthers) {
+    settings = {"bake.draft.lamps_apart=8", "grids.global=off"};
+    cooked(true);
+    json& turn = node("sun")["rotation"];
+    turn[0] = turn[0].get<double>() * 0.9;
+    double squares = 0;
+    for (const json& x : turn) squares += x.get<double>() * x.get<double>();
+    for (json& x : turn) x = x.get<double>() / std::sqrt(squares);
+    EXPECT_TRUE(cooked(true) == cooked(false));
 }
 
 template <class Entry>
