@@ -120,6 +120,25 @@ TEST(Texels, OfAFloorBelowFurnitureAreNone) {
     }
 }
 
+// Points are lifted off the floor by more than paper lies over it: below the paper nothing is lit for all that. In the
+// floor's own plane it may be the floor itself, in pieces that differ by rounding.
+TEST(Texels, OfAFloorUnderPaperAreNone) {
+    for (const float height_m : {1e-4f, 3.5e-4f}) {
+        Scene scene;
+        addFloor(scene, 1, addMaterial(scene, lambert(0.5f)));
+        Material both = lambert(0.5f);
+        both.double_sided = true;
+        addFloor(scene, 0.5f, addMaterial(scene, std::move(both)), height_m).node = "paper";
+        const RayScene rays(scene);
+        const auto charts = unwrap(rays, {.texels_per_metre = 4, .page_size = 256});
+        ASSERT_TRUE(charts.has_value());
+        const Texels texels = sampleTexels(rays, *charts, 4);
+        const auto within = [](glm::vec3 p) { return std::abs(p.x) < 0.4f && std::abs(p.z) < 0.4f; };
+        const size_t below = receiversWhere(rays, *charts, texels, "floor", within);
+        EXPECT_EQ(below > 0, height_m < 3e-4f) << height_m;
+    }
+}
+
 // About the vertical, as a level that is not along the axes: its planes differ by rounding.
 void turn(Scene& scene, float angle) {
     const auto turned = [&](glm::vec3 p) {
