@@ -54,8 +54,8 @@ Measured measure(const ReferenceTracer& tracer, std::span<const ReferencePoint> 
 }
 
 bool hidden(const RayScene& rays, glm::vec3 position_m, const TangentFrame& frame, uint32_t seed) {
-    const glm::vec3 lifted_m = position_m + hidden_lift_m * frame.normal;
-    const float way_m = (1 - in_plane_share) * hidden_lift_m;
+    const float lift_m = liftOff(position_m, hidden_lift_m), way_m = (1 - in_plane_share) * lift_m;
+    const glm::vec3 lifted_m = position_m + lift_m * frame.normal;
     if (rays.reach(lifted_m, -frame.normal, way_m, Surfaces::All) < way_m) return true;
     uint32_t backs = 0;
     for (uint32_t i = 0; i < hidden_rays; ++i) {
