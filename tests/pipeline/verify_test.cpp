@@ -209,19 +209,6 @@ TEST(MeasuredLight, BelowASheetIsHidden) {
     }
 }
 
-// 20 km from the origin a step of floats is 2 mm: a floor that nothing lies on is in sight there too.
-TEST(MeasuredLight, FarFromTheOriginNothingIsHidden) {
-    Scene scene;
-    constexpr float far_m = 20000.3f;
-    addFloor(scene, 1, addMaterial(scene, lambert(0.5f)), far_m);
-    const RayScene rays(scene);
-    const TangentFrame frame{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}};
-    for (int i = 0; i < 100; ++i) {
-        const float x = 0.017f * static_cast<float>(i) - 0.8f;
-        EXPECT_FALSE(hidden(rays, {x, far_m, 0.2f}, frame, 1)) << x;
-    }
-}
-
 TEST(Verify, FewPathsAreFewForSetsToo) {
     const Scene scene = furnace();
     const auto pack = cooked(scene, "draft");
