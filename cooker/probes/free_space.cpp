@@ -10,6 +10,9 @@ namespace {
 
 constexpr uint32_t few_rays = 24, many_rays = 192;
 constexpr uint32_t tries_per_place = 64;
+// Of what touches along one ray; and how far behind a ray goes on.
+constexpr int touching_max = 64;
+constexpr float past_touching_m = 1e-3f;
 
 // What rays all around a place meet.
 class Surroundings {
@@ -24,12 +27,7 @@ class Surroundings {
             if (!hit) continue;
             nearest_m_ = std::min(nearest_m_, hit->distance_m);
             is_close_ = nearest_m_ < clearance_m_;
-            const LevelTriangle& triangle = rays_.triangles()[hit->triangle];
-            const bool back = hit->back && !rays_.scene().materials[triangle.material].double_sided;
-            // The foot of a door's leaf often lies in the floor's plane, and shows through it from below.
-            if (triangle.condition != no_condition && !back) continue;
-            ++hits_;
-            backs_ += back;
+            count(*hit, direction, i);
         }
     }
     bool looksOpen() const { return !is_close_ && 4 * backs_ < hits_; }
@@ -37,6 +35,29 @@ class Surroundings {
     bool isSure() const { return backs_ == 0 && 4 * hits_ >= 3 * few_rays; }
 
    private:
+    // Where a front lies in one place with a back, solids touch, or rooms without a wall's thickness between them: more
+    // of the same lies behind, and what ends that tells which it is.
+    void count(Hit hit, glm::vec3 direction, uint32_t seed) {
+        glm::vec3 from_m = point_m_;
+        for (int passed = 0; passed <= touching_max; ++passed) {
+            const LevelTriangle& triangle = rays_.triangles()[hit.triangle];
+            const bool back = hit.back && !rays_.scene().materials[triangle.material].double_sided;
+            // The foot of a door's leaf often lies in the floor's plane, and shows through it from below.
+            if (triangle.condition != no_condition && !back) return;
+            std::optional<Hit> behind;
+            if (!back && rays_.liesOnBack(hit, from_m, direction)) {
+                from_m += direction * (hit.distance_m + liftOff(from_m, past_touching_m));
+                behind = rays_.nearest(from_m, direction, far_away_m, seed, Surfaces::All, ignored_);
+            }
+            if (!behind) {
+                ++hits_;
+                backs_ += back;
+                return;
+            }
+            hit = *behind;
+        }
+    }
+
     const RayScene& rays_;
     glm::vec3 point_m_;
     uint32_t ignored_;

@@ -19,7 +19,14 @@ std::unexpected<Error> ImportContext::error(std::string_view owner, std::string_
 }
 
 void ImportContext::warn(std::string_view owner, std::string_view text) {
-    scene.warnings.push_back(fmt::format("{}: {}: {}", scene.file, owner, text));
+    constexpr size_t named_max = 4;
+    const auto [of_text, is_new] = warned.try_emplace(std::string(text), Warned{scene.warnings.size()});
+    if (is_new) scene.warnings.emplace_back();
+    Warned& said = of_text->second;
+    if (said.owners++ < named_max) said.names += fmt::format("{}{}", said.names.empty() ? "" : ", ", owner);
+    const size_t unnamed = said.owners - std::min(said.owners, named_max);
+    scene.warnings[said.line] = fmt::format("{}: {}{}: {}", scene.file, said.names,
+                                            unnamed > 0 ? fmt::format(" and {} more", unnamed) : std::string(), text);
 }
 
 std::string ImportContext::nodeLabel(int index) const {

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -17,6 +18,8 @@ struct ImportContext {
 
     // "file: owner: text". `text` says what is wrong and how to mend it; `owner` comes from the functions below.
     std::unexpected<Error> error(std::string_view owner, std::string_view text) const;
+    // One line for all owners of the same text, of whom it names the first few: a kit's part stands in hundreds of
+    // places.
     void warn(std::string_view owner, std::string_view text);
 
     // "node 'lamp'", or "node 7" when it has no name. The index must be in range.
@@ -28,6 +31,13 @@ struct ImportContext {
     std::string imageLabel(int index) const;
 
     bool uses(std::string_view extension) const;
+
+    struct Warned {
+        size_t line;  // of scene.warnings
+        size_t owners = 0;
+        std::string names = {};
+    };
+    std::map<std::string, Warned, std::less<>> warned = {};  // by text
 };
 
 // A glTF number is a double; the scene's are floats. Too large for a float counts as infinite.

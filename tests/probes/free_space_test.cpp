@@ -21,6 +21,49 @@ TEST(FreeSpace, InsideOfARoomAndOutsideOfWhatStandsThere) {
     EXPECT_TRUE(inTheOpen(rays, {-1.98f, 0, 0}, no_model, 0.01f));
 }
 
+// Steps of boxes side by side, the last against the walls: most of what a ray meets in one is the front of the next.
+// And a block of cubes, which within shows nothing but fronts.
+TEST(FreeSpace, NoPlaceWithinSolidsThatTouch) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {4, 2, 3}, grey);
+    std::vector<glm::vec3> within;
+    for (int i = 0; i < 8; ++i) {
+        const float half = 0.1f * static_cast<float>(i + 1), x = 1.75f + 0.3f * static_cast<float>(i);
+        addSolid(scene, "step", {x, half - 2, -2.5f}, {0.15f, half, 0.5f}, grey);
+        within.push_back({x, half - 2, -2.5f});
+    }
+    for (int i = 0; i < 27; ++i) {
+        const glm::vec3 centre(0.4 * (i % 3) - 3, 0.4 * (i / 3 % 3) - 1, 0.4 * (i / 9));
+        addSolid(scene, "cube", centre, glm::vec3(0.2f), grey);
+        within.push_back(centre);
+    }
+    const RayScene rays(scene);
+    for (const glm::vec3& centre : within)
+        for (uint32_t i = 0; i < 20; ++i)
+            EXPECT_FALSE(inTheOpen(rays, centre + 0.2f * sequence3d(i, 3) - 0.1f)) << centre.x << ' ' << centre.y;
+    EXPECT_TRUE(inTheOpen(rays, {0.5f, 0, -2.5f}));
+}
+
+// Rooms whose walls have no thickness, beside each other and in a hull that faces outwards.
+TEST(FreeSpace, RoomsOfPaperAreOpen) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {2, 2, 2}, grey);
+    const size_t room = scene.meshes.size();
+    for (size_t i = 0; i < room; ++i) {
+        SceneMesh beside = scene.meshes[i];
+        for (glm::vec3& p : beside.positions_m) p.x += 4;
+        scene.meshes.push_back(beside);
+    }
+    addSolid(scene, "hull", {2, 0, 0}, {4, 2, 2}, grey);
+    addFloor(scene, 30, grey, -2.5f);
+    const RayScene rays(scene);
+    for (const float x : {0.0f, 4.0f, 1.8f, 10.0f})
+        for (uint32_t i = 0; i < 20; ++i)
+            EXPECT_TRUE(inTheOpen(rays, glm::vec3(x, 0, 0) + 0.2f * sequence3d(i, 3) - 0.1f)) << x;
+}
+
 // Far outside most rays meet nothing, some the room's backs, and fewer the front of a screen that stands there. By 24
 // rays alone 15 of these places would pass, as they happen to meet the screen and not the room.
 TEST(FreeSpace, NoPlaceOutsidePassesByLuck) {
