@@ -5,6 +5,7 @@
 #include <app/json_progress.h>
 #include <app/say.h>
 #include <app/terminal_progress.h>
+#include <cpu/worker_pool.h>
 #include <pipeline/budget.h>
 #include <pipeline/cook.h>
 #include <pipeline/human_bytes.h>
@@ -23,7 +24,7 @@
 namespace dimmer::cook {
 namespace {
 
-constexpr uint32_t threads_max = 1024;  // as the runtime's; millions are more than there is memory for
+constexpr uint32_t threads_max = WorkerPool::threads_max;  // millions are more than there is memory for
 
 struct CookArguments {
     CookOptions options;

@@ -67,7 +67,7 @@ using ProbeTermLight = LightOfTerm<ProbeLight>;
 
 // Light groups are measured over the receivers that they light directly, by their indirect light; terms with doors over
 // the receivers that see one of the doors, by what is stored. The threshold of those is a share of what the group's
-// light around the door changes with it (see series.cpp), within limits: at most the group's own threshold, or that
+// light around the door changes with it (see activity.cpp), within limits: at most the group's own threshold, or that
 // share of all of the group's light around the door where this is more; at least BakeSettings::door_share of that.
 struct TermReport {
     uint64_t receivers = 0;  // active ones

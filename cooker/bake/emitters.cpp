@@ -28,10 +28,6 @@ constexpr float lift_m = 1e-3f;  // off the emitter
 // The house's receivers ask 3.6 of 16 groups, of which 1.1 shine there, and 5.8 with cells of 2 m.
 constexpr float emitter_cell_min_m = 1;
 
-// Uniform on a triangle: the unit square, folded. As Hit::u and v.
-glm::vec2 onTriangle(glm::vec2 u) {
-    return std::sqrt(u.x) * glm::vec2(1 - u.y, u.y);
-}
 glm::vec3 pointOn(const Emitter& e, glm::vec2 at) {
     return e.corner + e.edge1 * at.x + e.edge2 * at.y;
 }
@@ -230,7 +226,7 @@ std::vector<uint8_t> EmitterSampler::litCells(const RayScene& rays, std::span<co
         const glm::vec3 d = cosineDirection(sequence2d(own, hash(seed, 2 * e.triangle)));
         const glm::vec3 world = t * d.x + b * d.y + normal * d.z;
         const glm::vec3 from =
-            pointOn(e, onTriangle(sequence2d(own, hash(seed, 2 * e.triangle + 1)))) + normal * lift_m;
+            pointOn(e, uniformOnTriangle(sequence2d(own, hash(seed, 2 * e.triangle + 1)))) + normal * lift_m;
         // Through doors, as what is behind them is lit once they open, and through panes, however little they let by.
         grid_.mark(from, world, rays.reach(from, world, far_m, Surfaces::Walls), spread, marks);
     }
@@ -315,7 +311,7 @@ EmitterSample EmitterSampler::sample(const CellGroup& from, glm::vec3 point, flo
         chance *= chanceWithin(emitter);
     }
     const Emitter& e = emitters_[emitter];
-    const glm::vec2 at = onTriangle(u);
+    const glm::vec2 at = uniformOnTriangle(u);
     const glm::vec3 to_target = pointOn(e, at) - point;
     const float distance2 = glm::dot(to_target, to_target);
     if (!(distance2 > 0)) return {};

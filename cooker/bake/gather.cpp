@@ -12,13 +12,6 @@
 namespace dimmer::cook {
 namespace {
 
-// Where shadow rays end, so as not to hit the emitter that they aim at: short of it by more than a hit is rounded, and
-// no more than a millimetre until that is far more than a kilometre's rounding, or thin covers would let its light
-// through.
-float shadowEnd(float distance_m) {
-    constexpr float share = 1e-4f, most_m = 1e-3f, rounding = 2e-6f;
-    return distance_m - std::max(std::min(share * distance_m, most_m), rounding * distance_m);
-}
 // Rays end anywhere, and light there takes as long to come from memory as a ray takes to trace: it is asked for when so
 // many rays have been traced. Where ends are known, whether any is wanted is asked before: so many rays ahead it begins
 // to load.

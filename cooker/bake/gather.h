@@ -235,7 +235,6 @@ class Gatherer {
     const Unwrap& unwrap() const { return unwrap_; }
     const Texels& texels() const { return texels_; }
     const DoorPaths& paths() const { return paths_; }
-    const EmitterSampler& emitters() const { return emitters_; }
     const ModelReceivers& models() const { return *models_; }
 
    private:

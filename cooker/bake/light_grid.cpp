@@ -55,12 +55,10 @@ std::vector<SurfacePoint> pointsOfSurfaces(const RayScene& rays) {
     for (uint32_t i = 0, t = 0; i < count && area_m2.back() > 0; ++i) {
         const double at = area_m2.back() * (i + 0.5) / count;
         while (area_m2[t + 1] < at) ++t;
-        const glm::vec2 u = sequence2d(i, 0);
-        const float across = std::sqrt(u.x);  // evenly over the triangle
+        const glm::vec2 on = uniformOnTriangle(sequence2d(i, 0));
         const LevelTriangle& triangle = rays.triangles()[t];
         const bool both_sides = rays.scene().materials[triangle.material].double_sided;
-        points.push_back(
-            {rays.pointOn(t, across * (1 - u.y), across * u.y), both_sides ? glm::vec3(0) : triangle.normal});
+        points.push_back({rays.pointOn(t, on.x, on.y), both_sides ? glm::vec3(0) : triangle.normal});
     }
     return points;
 }

@@ -38,10 +38,8 @@ std::vector<BeamPlace> landedIn(const TexelPieces& pieces, const PunctualLight& 
     const float solid_angle_sr = 2 * pi * (1 - cosine) / beam_directions;
     std::vector<BeamPlace> landed;
     for (uint32_t i = 0; i < beam_directions; ++i) {
-        const glm::vec2 square = sequence2d(i, 0);
-        const float along = 1 - square.x * (1 - cosine), across = std::sqrt(1 - along * along),
-                    angle = 2 * pi * square.y;
-        const glm::dvec3 direction(along * axis + across * (std::cos(angle) * u + std::sin(angle) * v));
+        const glm::vec3 d = uniformCapDirection(sequence2d(i, 0), cosine);
+        const glm::dvec3 direction(u * d.x + v * d.y + axis * d.z);
         for (const TexelPiece& piece : pieces.pieces()) {
             const auto p = landing(piece, glm::dvec3(light.position_m), direction);
             if (!p) continue;

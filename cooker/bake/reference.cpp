@@ -13,25 +13,11 @@
 namespace dimmer::cook {
 namespace {
 
-// Short of what a ray aims at by at most a millimetre, or a few roundings of a longer way.
-float justBefore(float distance_m) {
-    return distance_m - std::clamp(1e-4f * distance_m, 2e-6f * distance_m, std::max(1e-3f, 2e-6f * distance_m));
-}
-
 // Roulette ends paths; the limit is for nothing but a bound (0.99^4096, the largest reflectance's share, is 1e-18).
 constexpr int roulette_after = 3, vertices_max = 4096;
 // Shadow rays to lamps per vertex; with no more lamps than that, each gets its own.
 constexpr uint32_t lamp_rays = 4;
 constexpr uint32_t none = UINT32_MAX;
-
-// The chance that a ray to this point of a surface stops there.
-float coverage(const RayScene& rays, uint32_t triangle, float u, float v) {
-    const Material& material = rays.scene().materials[rays.triangles()[triangle].material];
-    if (material.alpha_mode == AlphaMode::Opaque) return 1;
-    const float alpha = rays.surfaceColor(triangle, u, v).a;
-    if (material.alpha_mode == AlphaMode::Blend) return std::clamp(alpha, 0.0f, 1.0f);
-    return alpha >= material.alpha_cutoff ? 1.0f : 0.0f;
-}
 
 // The index at which the cumulated weights pass `target`.
 uint32_t pick(const std::vector<float>& weights, float target) {
@@ -53,11 +39,10 @@ glm::vec3 lampDirection(const PunctualLight& light, glm::vec2 u) {
     const size_t choice = std::min(static_cast<size_t>(u.x), choices - 1);
     u.x -= static_cast<float>(choice);
     if (choice == beam.cosines.size()) return uniformSphereDirection(u);
-    const float z = 1 - u.x * (1 - beam.cosines[choice]);
-    const float radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
+    const glm::vec3 d = uniformCapDirection(u, beam.cosines[choice]);
     glm::vec3 t, b;
     orthonormalBasis(beam.axis, t, b);
-    return t * (radius * std::cos(phi)) + b * (radius * std::sin(phi)) + beam.axis * z;
+    return t * d.x + b * d.y + beam.axis * d.z;
 }
 
 // The density per steradian with which lampDirection() finds a direction.
@@ -68,6 +53,16 @@ float lampDirectionPdf(const PunctualLight& light, glm::vec3 away) {
     for (const float cosine : beam.cosines)
         if (glm::dot(beam.axis, away) >= cosine) sum += 1 / (2 * pi * (1 - cosine));
     return sum / static_cast<float>(beam.cosines.size() + besides);
+}
+
+// Back the way that the ray came, where nothing can stand: straight up is beyond the other surface where two meet at an
+// acute angle. Grazing rays stay nearer to the surface than others, and no nearer than rounding allows.
+glm::vec3 offSurface(const Hit& hit, glm::vec3 direction, glm::vec3 point, glm::vec3 normal) {
+    constexpr float back_max_m = 0.01f;
+    const float offset_m = liftOff(point, path_offset_m), least_m = liftOff(point, 0);
+    const float cosine = std::max(-glm::dot(direction, normal), 1e-6f);
+    const float back_m = std::min({offset_m / cosine, hit.distance_m / 2, back_max_m});
+    return point - direction * back_m + normal * std::max(0.0f, least_m - back_m * cosine);
 }
 
 uint32_t hashOf(glm::vec3 v, uint32_t seed) {
@@ -257,7 +252,7 @@ glm::vec3 ReferenceTracer::lampBounce(const Vertex& vertex, Path& path) const {
     if (!(cos_here > 0) || !(cos_there > 0) || !(cos_lamp > 0)) return glm::vec3(0);
     const float geometry = cos_here * cos_there / distance2;
     return lit->reflectance / pi * lamps_[lamp].weight * there.irradiance_lux *
-           (cos_lamp * geometry * rays_.transmittance(vertex.point, direction, justBefore(distance)) /
+           (cos_lamp * geometry * rays_.transmittance(vertex.point, direction, shadowEnd(distance)) /
             (geometry / pi + lampPdf(vertex, lamp, *lit)));
 }
 
@@ -273,11 +268,9 @@ float ReferenceTracer::areaPdf(const Vertex& vertex, uint32_t area_light, float 
 glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     if (!(vertex.area_weight_sum > 0)) return glm::vec3(0);
     const uint32_t chosen = pick(path.weights, path.next() * vertex.area_weight_sum);
-    const glm::vec2 u = path.next2();
+    const glm::vec2 on = uniformOnTriangle(path.next2());
     const AreaLight& light = area_lights_[chosen];
-    const float root = std::sqrt(u.x);
-    const float a = root * (1 - u.y), b = root * u.y;
-    const glm::vec3 to_target = rays_.pointOn(light.triangle, a, b) - vertex.point;
+    const glm::vec3 to_target = rays_.pointOn(light.triangle, on.x, on.y) - vertex.point;
     const float distance = glm::length(to_target);
     if (!(distance > 0)) return glm::vec3(0);
     const glm::vec3 direction = to_target / distance;
@@ -289,9 +282,9 @@ glm::vec3 ReferenceTracer::areaLight(const Vertex& vertex, Path& path) const {
     if (!(cos_emitter > 0) || !(cos_surface > 0)) return glm::vec3(0);
     const float by_area = areaPdf(vertex, chosen, distance, cos_emitter), by_hit = cos_surface / pi;
     // What is cut out or blended shines by its alpha, as a ray that hits it finds.
-    const float shown = coverage(rays_, light.triangle, a, b);
+    const float shown = rays_.alphaAt(light.triangle, on.x, on.y);
     return light.radiance_cd_m2 *
-           (shown * cos_surface * rays_.transmittance(vertex.point, direction, justBefore(distance)) /
+           (shown * cos_surface * rays_.transmittance(vertex.point, direction, shadowEnd(distance)) /
             (by_area + by_hit));
 }
 
@@ -307,16 +300,6 @@ glm::vec3 ReferenceTracer::skyLight(const Vertex& vertex, Path& path) const {
     if (!(by_sky > 0)) return glm::vec3(0);
     return radiance * (options_.always_weight * cos_surface * rays_.transmittance(vertex.point, direction, far_away_m) /
                        (by_sky + cos_surface / pi));
-}
-
-// Back the way that the ray came, where nothing can stand: straight up is beyond the other surface where two meet at an
-// acute angle. Grazing rays stay nearer to the surface than others, and no nearer than rounding allows.
-glm::vec3 offSurface(const Hit& hit, glm::vec3 direction, glm::vec3 point, glm::vec3 normal) {
-    constexpr float back_max_m = 0.01f;
-    const float offset_m = liftOff(point, path_offset_m), least_m = liftOff(point, 0);
-    const float cosine = std::max(-glm::dot(direction, normal), 1e-6f);
-    const float back_m = std::min({offset_m / cosine, hit.distance_m / 2, back_max_m});
-    return point - direction * back_m + normal * std::max(0.0f, least_m - back_m * cosine);
 }
 
 // The surface that was hit as the next vertex; empty where it reflects nothing.

@@ -50,15 +50,25 @@ inline float radicalInverse(uint32_t base, uint32_t i) {
     return sum;
 }
 
+// Uniform on a triangle, as Hit::u and v.
+inline glm::vec2 uniformOnTriangle(glm::vec2 u) {
+    return std::sqrt(u.x) * glm::vec2(1 - u.y, u.y);
+}
+
 // Cosine-distributed direction about +Z: density cos(theta) / pi.
 inline glm::vec3 cosineDirection(glm::vec2 u) {
     const float radius = std::sqrt(u.x), phi = 2 * pi * u.y;
     return {radius * std::cos(phi), radius * std::sin(phi), std::sqrt(std::max(0.0f, 1 - u.x))};
 }
 
-inline glm::vec3 uniformSphereDirection(glm::vec2 u) {
-    const float z = 1 - 2 * u.x, radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
+// Uniform over the cap of directions around +Z with cosines from `cos_min` to 1.
+inline glm::vec3 uniformCapDirection(glm::vec2 u, float cos_min) {
+    const float z = 1 - u.x * (1 - cos_min), radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
     return {radius * std::cos(phi), radius * std::sin(phi), z};
+}
+
+inline glm::vec3 uniformSphereDirection(glm::vec2 u) {
+    return uniformCapDirection(u, -1);
 }
 
 // Two unit vectors that complete unit `n` to a right-handed frame (Duff et al. 2017).

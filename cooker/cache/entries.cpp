@@ -1,6 +1,7 @@
 #include <cache/entries.h>
 
 #include <format/byte_stream.h>
+#include <pack/unshuffle.h>
 
 namespace dimmer::cook {
 namespace {
@@ -63,8 +64,7 @@ std::vector<float> getFloats(ByteReader& in) {
     const auto columns = in.getArray<std::byte>();
     std::vector<float> values(columns.size() / sizeof(float));
     const auto raw = std::as_writable_bytes(std::span(values));
-    for (size_t b = 0; b < sizeof(float); ++b)
-        for (size_t i = 0; i < values.size(); ++i) raw[i * sizeof(float) + b] = columns[b * values.size() + i];
+    unshuffle(std::span(columns).first(raw.size()), sizeof(float), false, raw);
     return values;
 }
 
@@ -107,13 +107,12 @@ constexpr size_t stored_floats = sizeof(Stored<Entry>) / sizeof(float);
 // Counts, terms, and the values in columns of floats.
 template <class Entry>
 void putRows(ByteWriter& out, const Sparse<Entry>& light) {
-    std::vector<uint16_t> counts;
-    std::vector<uint32_t> terms;  // a level with many doors has more than 65,535
+    std::vector<uint32_t> counts, terms;  // a level with many doors has more than 65,535
     const size_t count = light.entryCount();
     std::vector<float> columns(count * stored_floats<Entry>);
     size_t n = 0;
     for (size_t i = 0; i < light.rows(); ++i) {
-        counts.push_back(static_cast<uint16_t>(light.row(i).size()));
+        counts.push_back(static_cast<uint32_t>(light.row(i).size()));
         for (const Entry& l : light.row(i)) {
             terms.push_back(l.term);
             const auto values = std::bit_cast<std::array<float, stored_floats<Entry>>>(stored(l));
@@ -128,7 +127,7 @@ void putRows(ByteWriter& out, const Sparse<Entry>& light) {
 
 template <class Entry>
 std::optional<Sparse<Entry>> getRows(ByteReader& in) {
-    const auto counts = in.getArray<uint16_t>();
+    const auto counts = in.getArray<uint32_t>();
     const auto terms = in.getArray<uint32_t>();
     const std::vector<float> columns = getFloats(in);
     if (!in.ok() || columns.size() != terms.size() * stored_floats<Entry>) return {};
@@ -137,8 +136,8 @@ std::optional<Sparse<Entry>> getRows(ByteReader& in) {
     size_t n = 0;
     for (size_t i = 0; i < counts.size(); ++i) {
         row.clear();
-        if (n + counts[i] > terms.size()) return {};
-        for (uint16_t k = 0; k < counts[i]; ++k, ++n) {
+        if (counts[i] > terms.size() - n) return {};
+        for (uint32_t k = 0; k < counts[i]; ++k, ++n) {
             std::array<float, stored_floats<Entry>> values;
             for (size_t f = 0; f < values.size(); ++f) values[f] = columns[f * terms.size() + n];
             Entry& entry = row.emplace_back();
@@ -147,6 +146,7 @@ std::optional<Sparse<Entry>> getRows(ByteReader& in) {
         }
         rows.put(i, row);
     }
+    if (n != terms.size()) return {};
     return rows.finish();
 }
 

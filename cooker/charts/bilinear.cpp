@@ -9,8 +9,8 @@ namespace dimmer::cook {
 BilinearTaps::BilinearTaps(const Unwrap& unwrap, const Texels& texels)
     : unwrap_(unwrap), texels_(texels), shown_(texels.receiver_at.size(), no_index) {
     const auto at = [&](uint32_t address) -> uint32_t& {
-        const size_t row = size_t{TexelAddress::page(address)} * unwrap.page_height + TexelAddress::y(address);
-        return shown_[row * unwrap.page_width + TexelAddress::x(address)];
+        return shown_[unwrap.texelIndex(TexelAddress::page(address), TexelAddress::x(address),
+                                        TexelAddress::y(address))];
     };
     for (uint32_t i = 0; i < texels.size(); ++i) at(texels.address[i]) = i;
     for (const FillTexel& fill : texels.fills) at(fill.address) = fill.source;
@@ -19,7 +19,7 @@ BilinearTaps::BilinearTaps(const Unwrap& unwrap, const Texels& texels)
 uint32_t BilinearTaps::shownAt(uint32_t page, glm::ivec2 texel) const {
     const glm::ivec2 size(unwrap_.page_width, unwrap_.page_height);
     const glm::uvec2 at(glm::clamp(texel, glm::ivec2(0), size - 1));  // as samplers do at a page's edge
-    return shown_[(size_t{page} * unwrap_.page_height + at.y) * unwrap_.page_width + at.x];
+    return shown_[unwrap_.texelIndex(page, at.x, at.y)];
 }
 
 void BilinearTaps::around(uint32_t receiver, std::vector<Tap>& taps) const {

@@ -1,5 +1,6 @@
 #include <charts/file_uv.h>
 
+#include <charts/groups.h>
 #include <charts/polygon.h>
 #include <charts/raster.h>
 #include <charts/unwrap.h>
@@ -193,12 +194,7 @@ void dropInvalidUnwraps(Scene& scene, float texels_per_metre) {
 }
 
 std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span<const uint32_t> triangles) {
-    std::vector<uint32_t> lower(triangles.size());  // a triangle of the same piece, or the piece's first itself
-    std::iota(lower.begin(), lower.end(), 0u);
-    const auto firstOf = [&](uint32_t i) {
-        while (lower[i] != i) i = lower[i] = lower[lower[i]];
-        return i;
-    };
+    Groups groups(triangles.size());  // that the first triangle of each stands for
     // Per corner, by the bits of its places in the unwrap and in space: islands may touch.
     std::map<std::array<uint32_t, 5>, uint32_t> triangle_at;
     for (uint32_t i = 0; i < triangles.size(); ++i)
@@ -207,13 +203,13 @@ std::vector<std::vector<uint32_t>> unwrapPieces(const SceneMesh& mesh, std::span
             const glm::vec2 uv = mesh.uv1[vertex] + 0.0f;  // -0 is 0
             const glm::vec3 p = mesh.positions_m[vertex] + 0.0f;
             const auto corner = std::bit_cast<std::array<uint32_t, 5>>(std::array{uv.x, uv.y, p.x, p.y, p.z});
-            const uint32_t a = firstOf(i), b = firstOf(triangle_at.try_emplace(corner, i).first->second);
-            lower[std::max(a, b)] = std::min(a, b);
+            const uint32_t a = groups.find(i), b = groups.find(triangle_at.try_emplace(corner, i).first->second);
+            if (a != b) groups.join(std::min(a, b), std::max(a, b));
         }
     std::vector<std::vector<uint32_t>> pieces;
     std::vector<uint32_t> piece_of(triangles.size());
     for (uint32_t i = 0; i < triangles.size(); ++i) {
-        const uint32_t first = firstOf(i);
+        const uint32_t first = groups.find(i);
         if (first == i) {
             piece_of[i] = static_cast<uint32_t>(pieces.size());
             pieces.emplace_back();

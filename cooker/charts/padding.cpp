@@ -57,9 +57,7 @@ class Padding {
     }
 
    private:
-    size_t index(uint32_t page, uint32_t x, uint32_t y) const {
-        return (size_t{page} * unwrap_.page_height + y) * unwrap_.page_width + x;
-    }
+    size_t index(uint32_t page, uint32_t x, uint32_t y) const { return unwrap_.texelIndex(page, x, y); }
 
     bool touchesCovered(const Chart& c, uint32_t x, uint32_t y) const {
         for (uint32_t ny = std::max(y, c.y + 1) - 1; ny <= std::min(y + 1, c.y + c.height - 1); ++ny)

@@ -10,6 +10,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <glm/gtc/bitfield.hpp>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -333,16 +334,6 @@ class TexelSampler {
     std::vector<glm::u16vec2> tries_;
 };
 
-// The bits of a coordinate, two zeros after each.
-uint64_t spread(uint32_t bits) {
-    uint64_t b = bits & 0x1fffff;
-    b = (b | b << 32) & 0x1f00000000ffff;
-    b = (b | b << 16) & 0x1f0000ff0000ff;
-    b = (b | b << 8) & 0x100f00f00f00f00f;
-    b = (b | b << 4) & 0x10c30c30c30c30c3;
-    return (b | b << 2) & 0x1249249249249249;
-}
-
 // The texels that have points, along a curve through space (Morton 1966). Pages put a room's charts far from each
 // other; this way what rays of neighbours read is near by in memory, and so are its numbers.
 std::vector<uint32_t> bySpace(std::span<const TexelSampler::Result> texels) {
@@ -353,7 +344,7 @@ std::vector<uint32_t> bySpace(std::span<const TexelSampler::Result> texels) {
     for (uint32_t i = 0; i < texels.size(); ++i) {
         if (texels[i].points.empty()) continue;
         const glm::uvec3 cell(glm::min((texels[i].place_m - low) / cell_m, cells_max));
-        order.emplace_back(spread(cell.x) | spread(cell.y) << 1 | spread(cell.z) << 2, i);
+        order.emplace_back(glm::bitfieldInterleave(cell.x, cell.y, cell.z), i);
     }
     std::ranges::sort(order);
     std::vector<uint32_t> sorted;
@@ -421,8 +412,7 @@ uint32_t neighbourInChart(const Unwrap& unwrap, const Texels& texels, size_t rec
         x >= static_cast<int>(chart.x + chart.width) || y >= static_cast<int>(chart.y + chart.height))
         return no_index;
     const uint32_t found =
-        texels.receiver_at[(size_t{chart.page} * unwrap.page_height + static_cast<size_t>(y)) * unwrap.page_width +
-                           static_cast<size_t>(x)];
+        texels.receiver_at[unwrap.texelIndex(chart.page, static_cast<uint32_t>(x), static_cast<uint32_t>(y))];
     // Copies of a receiver (padding) do not count twice.
     const bool own =
         found != no_index &&
@@ -438,7 +428,7 @@ uint32_t receiverOf(const Unwrap& unwrap, const Texels& texels, const Hit& hit) 
     const glm::vec2 p = (1 - hit.u - hit.v) * uv[0] + hit.u * uv[1] + hit.v * uv[2];
     const auto x = std::clamp(static_cast<uint32_t>(std::max(p.x, 0.0f)), c.x, c.x + c.width - 1);
     const auto y = std::clamp(static_cast<uint32_t>(std::max(p.y, 0.0f)), c.y, c.y + c.height - 1);
-    return texels.receiver_at[(size_t{c.page} * unwrap.page_height + y) * unwrap.page_width + x];
+    return texels.receiver_at[unwrap.texelIndex(c.page, x, y)];
 }
 
 }  // namespace dimmer::cook

@@ -58,6 +58,10 @@ struct Unwrap {
     std::vector<ChartWarning> warnings;
 
     uint32_t faceOf(uint32_t triangle, bool back) const { return (back ? back_face : front_face)[triangle]; }
+    // Of what has an entry for each texel of all pages.
+    size_t texelIndex(uint32_t page, uint32_t x, uint32_t y) const {
+        return (size_t{page} * page_height + y) * page_width + x;
+    }
 };
 
 inline constexpr uint32_t padding_texels = 1;  // around a chart

@@ -18,11 +18,6 @@
 namespace dimmer::cook {
 namespace {
 
-size_t pageIndex(const PackData& pack, uint32_t address) {
-    return (size_t{TexelAddress::page(address)} * pack.page_height + TexelAddress::y(address)) * pack.page_width +
-           TexelAddress::x(address);
-}
-
 // Contributions of a row of light, ascending.
 template <class Light>
 std::vector<uint32_t> contributionsOf(std::span<const LightOfTerm<Light>> light,
@@ -129,7 +124,7 @@ void buildClusters(const Texels& texels, const Baked& baked, std::span<const uin
     tbb::parallel_for(size_t{0}, shown.size(), [&](size_t t) {
         for (const ReceiverLight& l : baked.light.row(shown[t].source))
             if (l.term == always_group)
-                pack.base_pages[pageIndex(pack, shown[t].address)] = encodeTexel(l.light, encoding);
+                pack.base_pages[texelIndex(pack, shown[t].address)] = encodeTexel(l.light, encoding);
     });
     const auto listOf = [&](uint32_t receiver) {
         return contributionsOf(baked.light.row(receiver), contribution_of_term);

@@ -92,12 +92,12 @@ void forSurface(const RayScene& rays, uint32_t model, auto&& visit) {
             std::ceil(std::min(area / std::max(area_per_point, 1e-12f), float{points_per_triangle_max}));
         const uint32_t points = std::max(points_per_triangle, static_cast<uint32_t>(by_area));
         for (uint32_t i = 0; i < points; ++i) {
-            const glm::vec2 square = sequence2d(i, t);
-            const float root = std::sqrt(square.x), u = root * (1 - square.y), v = root * square.y;
-            const Reflector at{rays.alphaAt(t, u, v), material.reflectance(glm::vec3(rays.surfaceColor(t, u, v)))};
-            visit(rays.pointOn(t, u, v), triangle.normal, area / static_cast<float>(points), at);
-            if (material.double_sided)
-                visit(rays.pointOn(t, u, v), -triangle.normal, area / static_cast<float>(points), at);
+            const glm::vec2 on = uniformOnTriangle(sequence2d(i, t));
+            const glm::vec3 point_m = rays.pointOn(t, on.x, on.y);
+            const Reflector at{rays.alphaAt(t, on.x, on.y),
+                               material.reflectance(glm::vec3(rays.surfaceColor(t, on.x, on.y)))};
+            visit(point_m, triangle.normal, area / static_cast<float>(points), at);
+            if (material.double_sided) visit(point_m, -triangle.normal, area / static_cast<float>(points), at);
         }
     });
 }

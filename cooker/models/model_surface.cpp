@@ -70,13 +70,14 @@ std::vector<ModelPlace> modelPlaces(const RayScene& rays, uint32_t index, uint32
         const glm::vec3 draw = sequence3d(i, hash(place_seed, index));
         const uint32_t face = sides.drawn(draw.z), t = (face - triangle_faces) / 2;
         const bool back = face % 2;
-        const float root = std::sqrt(draw.x), u = root * (1 - draw.y), v = root * draw.y;
+        const glm::vec2 at = uniformOnTriangle(glm::vec2(draw));
         const LevelTriangle& triangle = rays.triangles()[t];
-        const glm::vec3 on = rays.pointOn(t, u, v);
+        const glm::vec3 on = rays.pointOn(t, at.x, at.y);
         const glm::vec3 p = on + (back ? -place_lift_m : place_lift_m) * triangle.normal;
         // The model's own fronts would make up for backs of what else is there.
         if (!inTheOpen(rays, p, index, 0) || !inTheOpen(rays, p, no_model, 0)) continue;
-        places.push_back({{p, face}, nearProbes(model, on), transferAt(rays.scene(), model, triangle, back, u, v)});
+        places.push_back(
+            {{p, face}, nearProbes(model, on), transferAt(rays.scene(), model, triangle, back, at.x, at.y)});
     }
     return places;
 }

@@ -42,6 +42,9 @@ class TransferTracer {
           lift_m_(std::max(lift_min_m, lift_share * glm::length(model.max_m - model.min_m))) {
         for (uint32_t m = 0; m < own_.meshes.size(); ++m)
             for (uint32_t v = 0; v < own_.meshes[m].positions_m.size(); ++v) vertices_.emplace_back(m, v);
+        for (const SceneMesh& mesh : own_.meshes)
+            double_sided_.push_back(std::ranges::any_of(
+                mesh.triangle_materials, [&](uint32_t material) { return own_.materials[material].double_sided; }));
         findIncident();
     }
 
@@ -54,7 +57,7 @@ class TransferTracer {
                 const auto [m, v] = vertices_[i];
                 auto& sides = next[m][v];
                 sides[0] = at(m, v, false, static_cast<uint32_t>(i), rays);
-                sides[1] = isDoubleSided(m) ? at(m, v, true, static_cast<uint32_t>(i), rays) : sides[0];
+                sides[1] = double_sided_[m] ? at(m, v, true, static_cast<uint32_t>(i), rays) : sides[0];
                 progress.advance(1);
             });
             now_ = std::move(next);
@@ -63,11 +66,6 @@ class TransferTracer {
     }
 
    private:
-    bool isDoubleSided(uint32_t mesh) const {
-        return std::ranges::any_of(own_.meshes[mesh].triangle_materials,
-                                   [&](uint32_t material) { return own_.materials[material].double_sided; });
-    }
-
     // What the lobe sees of the model is replaced by what the model throws back. Rays start all over the triangles that
     // meet in the vertex, as often as they are drawn with the vertex's share (which has a density of 6 w (1 - w), that
     // of the middle one of three numbers): so the mean over the surface is right, and a corner that touches something
@@ -152,6 +150,7 @@ class TransferTracer {
     RayScene rays_;
     glm::mat3 model_from_world_;
     float lift_m_;
+    std::vector<bool> double_sided_;                            // by mesh: whether any of it is
     std::vector<std::pair<uint32_t, uint32_t>> vertices_;       // mesh, vertex
     std::vector<std::vector<std::vector<Incident>>> incident_;  // triangles, per mesh and vertex
     ModelTransfers now_;                                        // of the last round; black before the first

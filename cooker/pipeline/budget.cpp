@@ -100,7 +100,7 @@ PackCost costOf(const PackData& pack) {
 Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Profile& profile) {
     std::vector<std::string> over;
     auto check = [&](std::string_view what, uint64_t bytes, uint64_t budget) {
-        if (budget > 0 && bytes > budget)
+        if (isOver(bytes, budget))
             over.push_back(fmt::format("{}: {} of {}, {} too much", what, humanBytes(bytes), humanBytes(budget),
                                        humanBytes(bytes - budget)));
     };
@@ -113,15 +113,14 @@ Expected<void> checkBudgets(const PackData& pack, const PackCost& cost, const Pr
         check(describe(pack.elements[e.element]), e.bytes, profile.budget_per_element);
     if (over.empty()) return {};
     std::string holders;
-    const bool records = (profile.budget_total > 0 && cost.device() > profile.budget_total) ||
-                         (profile.budget_dynamic > 0 && cost.dynamic > profile.budget_dynamic) ||
+    const bool records = isOver(cost.device(), profile.budget_total) || isOver(cost.dynamic, profile.budget_dynamic) ||
                          std::ranges::any_of(cost.elements, [&](const ElementCost& e) {
-                             return profile.budget_per_element > 0 && e.bytes > profile.budget_per_element;
+                             return isOver(e.bytes, profile.budget_per_element);
                          });
     if (records && !cost.elements.empty()) holders += "; the largest elements: " + largestElements(pack, cost);
-    if (profile.budget_base_lightmaps > 0 && cost.base_lightmap > profile.budget_base_lightmaps)
+    if (isOver(cost.base_lightmap, profile.budget_base_lightmaps))
         holders += "; the largest meshes: " + largestMeshes(pack);
-    if (profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid)
+    if (isOver(cost.global_grid, profile.budget_global_grid))
         holders += fmt::format("; the grid has {} probes", pack.probes.global.positions.size());
     return fail(ErrorCode::OverBudget,
                 fmt::format("over budget, nothing was written: {}{}", fmt::join(over, "; "), holders));

@@ -33,6 +33,11 @@ struct PackCost {
 
 PackCost costOf(const PackData& pack);
 
+// A budget of 0 is none.
+inline bool isOver(uint64_t bytes, uint64_t budget) {
+    return budget > 0 && bytes > budget;
+}
+
 // Per category and per element: bytes, share of the budget, records of texels, energy dropped. Of the profile, its
 // budgets count.
 std::string budgetTable(const PackData& pack, const PackCost& cost, const Profile& budgets);

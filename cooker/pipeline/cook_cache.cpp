@@ -155,18 +155,26 @@ std::string CookCache::whyMissing(Find find, const std::vector<std::string>& par
     return changed.empty() ? "no longer in the cache" : fmt::format("{}", fmt::join(changed, ", "));
 }
 
-std::optional<std::vector<std::byte>> CookCache::find(std::string_view kind, const std::string& what, const Key& key,
-                                                      const std::vector<std::string>& parts) {
-    Entry entry = look(kind, key);
-    const bool hit = entry.find == Find::Hit;
-    lines_.push_back({round_ + what, hit, hit ? "" : whyMissing(entry.find, parts)});
-    return hit ? std::optional(std::move(entry.bytes)) : std::nullopt;
+template <class Decode>
+auto CookCache::look(std::string_view kind, const Key& key, Find& how, Decode decode) -> decltype(decode({})) {
+    const Entry entry = store_.find(kind, key);
+    how = entry.find;
+    if (how != Find::Hit) return {};
+    auto found = decode(entry.bytes);
+    if (found)
+        used_.push_back(CacheStore::nameOf(kind, key));
+    else
+        how = Find::Damaged;
+    return found;
 }
 
-Entry CookCache::look(std::string_view kind, const Key& key) {
-    Entry entry = store_.find(kind, key);
-    if (entry.find == Find::Hit) used_.push_back(CacheStore::nameOf(kind, key));
-    return entry;
+template <class Decode>
+auto CookCache::find(std::string_view kind, const std::string& what, const Key& key,
+                     const std::vector<std::string>& parts, Decode decode) -> decltype(decode({})) {
+    Find how;
+    auto found = look(kind, key, how, decode);
+    lines_.push_back({round_ + what, found.has_value(), found ? "" : whyMissing(how, parts)});
+    return found;
 }
 
 void CookCache::keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes) {
@@ -180,8 +188,7 @@ void CookCache::note(const std::string& name, const Expected<void>& kept) {
 }
 
 std::optional<ChartsEntry> CookCache::findCharts(const Key& key) {
-    const auto bytes = find(charts_kind, "charts", key, {"code", "geometry", "settings of charts"});
-    return bytes ? chartsFromBytes(*bytes) : std::nullopt;
+    return find(charts_kind, "charts", key, {"code", "geometry", "settings of charts"}, chartsFromBytes);
 }
 
 void CookCache::keepCharts(const Key& key, const ChartsEntry& entry) {
@@ -189,8 +196,7 @@ void CookCache::keepCharts(const Key& key, const ChartsEntry& entry) {
 }
 
 std::optional<PackEntry> CookCache::findPack(const Key& key) {
-    const auto bytes = find(pack_kind, "pack", key, {"code", "level", "settings"});
-    auto entry = bytes ? packFromBytes(*bytes) : std::nullopt;
+    auto entry = find(pack_kind, "pack", key, {"code", "level", "settings"}, packFromBytes);
     if (!entry) return entry;
     for (const std::string& part : entry->parts) {
         store_.markUsed(part);
@@ -209,8 +215,7 @@ void CookCache::keepPack(const Key& key, PackEntry entry) {
 }
 
 std::optional<GroupLight> CookCache::findGroup(const std::string& what, const Key& key) {
-    const auto bytes = find(light_kind, what, key, partsOfGroup(what));
-    return bytes ? groupFromBytes(*bytes) : std::nullopt;
+    return find(light_kind, what, key, partsOfGroup(what), groupFromBytes);
 }
 
 void CookCache::keepGroup(const Key& key, const GroupLight& light) {
@@ -218,8 +223,7 @@ void CookCache::keepGroup(const Key& key, const GroupLight& light) {
 }
 
 std::optional<BakedGrid> CookCache::findGrid(const Key& key, const std::vector<std::string>& parts) {
-    const auto bytes = find(grid_kind, "global grid", key, parts);
-    return bytes ? gridFromBytes(*bytes) : std::nullopt;
+    return find(grid_kind, "global grid", key, parts, gridFromBytes);
 }
 
 void CookCache::keepGrid(const Key& key, const BakedGrid& grid) {
@@ -286,12 +290,14 @@ void CookCache::keepSites(const Key& group, std::span<const SiteBlock> blocks,
 }
 
 std::optional<std::vector<glm::vec3>> CookCache::findPlaces(const Key& key) {
-    const Entry entry = look(places_kind, key);
-    places_.add(entry.find);
-    if (entry.find != Find::Hit) return {};
-    format::ByteReader in(entry.bytes);
-    auto places = in.getArray<glm::vec3>();
-    return in.atEnd() ? std::optional(std::move(places)) : std::nullopt;
+    Find how;
+    auto found = look(places_kind, key, how, [](std::span<const std::byte> bytes) {
+        format::ByteReader in(bytes);
+        auto places = in.getArray<glm::vec3>();
+        return in.atEnd() ? std::optional(std::move(places)) : std::nullopt;
+    });
+    places_.add(how);
+    return found;
 }
 
 void CookCache::keepPlaces(const Key& key, std::span<const glm::vec3> places) {
@@ -301,9 +307,10 @@ void CookCache::keepPlaces(const Key& key, std::span<const glm::vec3> places) {
 }
 
 std::optional<SparseLight> CookCache::findRadiance(const Key& key) {
-    const Entry entry = look(radiance_kind, key);
-    radiance_.add(entry.find);
-    return entry.find == Find::Hit ? radianceFromBytes(entry.bytes) : std::nullopt;
+    Find how;
+    auto found = look(radiance_kind, key, how, radianceFromBytes);
+    radiance_.add(how);
+    return found;
 }
 
 void CookCache::keepRadiance(const Key& key, const SparseLight& radiance) {

@@ -76,9 +76,13 @@ class CookCache {
     const std::vector<std::string>& warnings() const { return warnings_; }
 
    private:
-    std::optional<std::vector<std::byte>> find(std::string_view kind, const std::string& what, const Key& key,
-                                               const std::vector<std::string>& parts);
-    Entry look(std::string_view kind, const Key& key);
+    // What `decode` makes of an entry's bytes; an entry that it makes nothing of is damaged.
+    template <class Decode>
+    auto look(std::string_view kind, const Key& key, Find& how, Decode decode) -> decltype(decode({}));
+    // The same, with a line of its own.
+    template <class Decode>
+    auto find(std::string_view kind, const std::string& what, const Key& key, const std::vector<std::string>& parts,
+              Decode decode) -> decltype(decode({}));
     void keep(std::string_view kind, const Key& key, std::span<const std::byte> bytes);
     void note(const std::string& name, const Expected<void>& kept);
     std::string whyMissing(Find find, const std::vector<std::string>& parts) const;

@@ -10,6 +10,17 @@
 #include <limits>
 
 namespace dimmer::cook {
+namespace {
+
+// The middle one of its box's sides.
+float widthM(const SceneMesh& mesh) {
+    glm::vec3 low(std::numeric_limits<float>::infinity()), high = -low;
+    for (const glm::vec3& p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
+    const glm::vec3 side = high - low;
+    return std::max(std::min(side.x, side.y), std::min(std::max(side.x, side.y), side.z));
+}
+
+}  // namespace
 
 std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
     constexpr float smallest = 0x1p-14f;  // what both colour formats store with a step of a few per cent
@@ -70,14 +81,6 @@ std::optional<std::string> allInTheDark(const RayScene& rays, const Unwrap& unwr
            ": none of its light arrives at any surface with a lightmap, and all of it comes out black; something may "
            "enclose the level (a dome of sky blocks the sun: 'dimmer_lighting': 'dynamic' leaves it out), or its "
            "lights have an intensity of 0";
-}
-
-// The middle one of its box's sides.
-float widthM(const SceneMesh& mesh) {
-    glm::vec3 low(std::numeric_limits<float>::infinity()), high = -low;
-    for (const glm::vec3& p : mesh.positions_m) low = glm::min(low, p), high = glm::max(high, p);
-    const glm::vec3 side = high - low;
-    return std::max(std::min(side.x, side.y), std::min(std::max(side.x, side.y), side.z));
 }
 
 std::optional<std::string> tooSmallForTexels(const RayScene& rays, const Unwrap& unwrap, const Texels& texels) {

@@ -30,7 +30,7 @@ std::string waysOut(const std::vector<Remedy>& found) {
 // What remains where nothing is enough by itself.
 std::string lastWays(const PackCost& cost, const Profile& profile, bool fit_would_do) {
     std::string text;
-    if (profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid)
+    if (isOver(cost.global_grid, profile.budget_global_grid))
         text += "\n  --set grids.global=off leaves out the global grid, and with it the light of what moves";
     if (fit_would_do) text += "\n--fit tries these together";
     return text;

@@ -301,11 +301,8 @@ TexelRecord blended(std::span<const TexelRecord> records) {
 
 double decodedLux(const TexelRecord& record, const TexelEncoding& encoding, glm::vec3 n) {
     const auto stored = decodeColor(encoding.color_format, record.irradiance);
-    const Highlight h = decodeDirection(record.direction);
-    const float highlight = h.bx * n.x + h.by * n.y + (1 - h.ambient) * n.z;
-    const float falloff = encoding.direction_model == DirectionModel::Ahd ? h.ambient + std::max(0.0f, highlight)
-                                                                          : std::max(0.0f, h.ambient + highlight);
-    return static_cast<double>(luminance(glm::vec3(stored[0], stored[1], stored[2])) * falloff / encoding.exposure);
+    const float shape = falloff(encoding.direction_model, decodeDirection(record.direction), {n.x, n.y, n.z});
+    return static_cast<double>(luminance(glm::vec3(stored[0], stored[1], stored[2])) * shape / encoding.exposure);
 }
 
 // The base, then the sets that give most light, at most `sets` of them.

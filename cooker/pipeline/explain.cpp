@@ -106,19 +106,14 @@ struct NearTexel {
     ReceiverPlace place;
 };
 
-size_t texelOf(const PackData& d, uint32_t address) {
-    return (size_t{TexelAddress::page(address)} * d.page_height + TexelAddress::y(address)) * d.page_width +
-           TexelAddress::x(address);
-}
-
 // All texels within one step of the place: more than bilinear filtering reads.
 std::vector<NearTexel> texelsAround(const PackData& d, uint32_t page, std::array<uint32_t, 2> centre) {
     std::vector<NearTexel> near;
     for (uint32_t y = std::max(centre[1], 1u) - 1; y <= std::min(centre[1] + 1, d.page_height - 1); ++y)
         for (uint32_t x = std::max(centre[0], 1u) - 1; x <= std::min(centre[0] + 1, d.page_width - 1); ++x)
-            near.push_back({texelOf(d, TexelAddress::pack(page, x, y)), 0, {}});
+            near.push_back({texelIndex(d, TexelAddress::pack(page, x, y)), 0, {}});
     for (uint32_t r = 0; r < d.addresses.size(); ++r) {
-        const size_t texel = texelOf(d, d.addresses[r]);
+        const size_t texel = texelIndex(d, d.addresses[r]);
         const auto found = std::ranges::find(near, texel, &NearTexel::texel);
         if (found == near.end()) continue;
         found->receiver = r;
@@ -160,7 +155,7 @@ Explanation explainSurface(const Pack& pack, const CpuRuntime& runtime, const Su
         n = {glm::dot(*normal, frame.tangent), glm::dot(*normal, frame.bitangent), glm::dot(*normal, frame.normal)};
     const uint32_t page = pack.meshes()[surface.mesh].page;
     const std::vector<NearTexel> near = texelsAround(d, page, at.texel);
-    const size_t centre = texelOf(d, TexelAddress::pack(page, at.texel[0], at.texel[1]));
+    const size_t centre = texelIndex(d, TexelAddress::pack(page, at.texel[0], at.texel[1]));
     const NearTexel& own = *std::ranges::find(near, centre, &NearTexel::texel);
     at.receiver = own.place;
 
@@ -213,10 +208,10 @@ Explanation explainAir(const Pack& pack, const CpuRuntime& runtime, glm::vec3 po
     }
 
     // Otherwise black probes, looked up just as blended ones are.
-    std::vector<uint32_t> scratch((1 + probe_words) * probes.base.size(), 0);
+    std::vector<uint32_t> scratch(words_per_probe * probes.base.size(), 0);
     const auto put = [&](uint32_t number, const ProbeRecord& record) {
         const ProbeRecord canonical = canonicalProbe(d.color_format, record);
-        uint32_t* words = &scratch[size_t{1 + probe_words} * number];
+        uint32_t* words = &scratch[words_per_probe * number];
         words[0] = canonical.light;
         std::ranges::copy(canonical.bands, words + 1);
     };

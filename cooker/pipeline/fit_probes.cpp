@@ -47,7 +47,7 @@ Remedy toProbes(const PackData& pack, const PackCost& cost, const Profile& profi
 Remedy byProbes(const PackData& pack, const PackCost& cost, const Profile& profile, const LossTable& losses) {
     const double for_grid = gridIsOver(cost, profile) ? ratio(profile.budget_global_grid, cost.global_grid) : 1.0;
     double for_total = 1;
-    if (profile.budget_total > 0 && cost.device() > profile.budget_total)
+    if (isOver(cost.device(), profile.budget_total))
         for_total -= ratio(cost.device() - profile.budget_total, cost.global_grid + cost.probe_records);
     Profile others = profile;
     others.budget_total = others.budget_global_grid = 0;

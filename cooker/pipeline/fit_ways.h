@@ -20,15 +20,15 @@ inline uint64_t scaledBytes(uint64_t bytes, double share) {
 }
 
 inline bool gridIsOver(const PackCost& cost, const Profile& profile) {
-    return profile.budget_global_grid > 0 && cost.global_grid > profile.budget_global_grid;
+    return isOver(cost.global_grid, profile.budget_global_grid);
 }
 
 inline bool localGridsAreOver(const PackCost& cost, const Profile& profile) {
-    return profile.budget_local_grids > 0 && cost.local_grids > profile.budget_local_grids;
+    return isOver(cost.local_grids, profile.budget_local_grids);
 }
 
 inline bool baseIsOver(const PackCost& cost, const Profile& profile) {
-    return profile.budget_base_lightmaps > 0 && cost.base_lightmap > profile.budget_base_lightmaps;
+    return isOver(cost.base_lightmap, profile.budget_base_lightmaps);
 }
 
 // Whether a budget of records, pages or all is exceeded, which thresholds and density help with.

@@ -147,7 +147,7 @@ void addQuality(const std::string& name, Quality& q, std::vector<Setting>& list)
     list.push_back({prefix + "samples_per_texel", &q.samples_per_texel, 1, 64,
                     "points of a texel that rays start from; more soften what a texel at an edge sees"});
     list.push_back({prefix + "series_rays", &q.series_rays, 1, 4096,
-                    "rays per texel for the bounces; 1 to 2 bytes of memory each while the bake runs"});
+                    "rays per texel for the bounces; 2 to 3 bytes of memory each while the bake runs"});
     list.push_back({prefix + "rays", &q.rays, 1, 1 << 20,
                     "rays per texel and light set at most, in rounds of 32, for what is stored: the bake's time"});
     list.push_back({prefix + "emitter_samples", &q.emitter_samples, 0, 4096,

@@ -20,6 +20,7 @@ namespace dimmer::cook {
 namespace {
 
 constexpr uint32_t tries_per_point = 20;
+const float tilt_cos_min = std::cos(tilt_max_deg * pi / 180);
 // A set's light at a point is known well enough at this share of the light there and of the set's typical light, with
 // the default limit of paths; more paths make it smaller, as they do the noise.
 constexpr double set_relative = 0.04;
@@ -40,8 +41,7 @@ struct PackTriangle {
 
 std::vector<PackTriangle> litTriangles(const Pack& pack, const std::vector<bool>& door_open) {
     // Elements hold the light sets first, then the doors in the scene's order.
-    const auto sets = static_cast<size_t>(
-        std::ranges::count(pack.elements(), ElementKind::LightSet, [](const Element& e) { return e.kind; }));
+    const auto sets = static_cast<size_t>(std::ranges::count(pack.elements(), ElementKind::LightSet, &Element::kind));
     std::vector<PackTriangle> out;
     double sum = 0;
     for (uint32_t m = 0; m < pack.meshes().size(); ++m) {
@@ -60,8 +60,8 @@ std::vector<PackTriangle> litTriangles(const Pack& pack, const std::vector<bool>
 
 VerifyPoint pointOn(const Pack& pack, const PackTriangle& t, glm::vec2 u) {
     const Mesh& mesh = pack.meshes()[t.mesh];
-    const float root = std::sqrt(u.x);
-    const std::array weights{1 - root, root * (1 - u.y), root * u.y};
+    const glm::vec2 on = uniformOnTriangle(u);
+    const std::array weights{1 - on.x - on.y, on.x, on.y};
     std::array<glm::vec3, 3> positions;
     std::array<glm::vec2, 3> uv_texels;
     VerifyPoint p;
@@ -82,13 +82,6 @@ VerifyPoint pointOn(const Pack& pack, const PackTriangle& t, glm::vec2 u) {
 
 glm::vec3 fromTangent(const TangentFrame& f, glm::vec3 d) {
     return f.tangent * d.x + f.bitangent * d.y + f.normal * d.z;
-}
-
-// Uniform over the cap around +Z.
-glm::vec3 tiltedNormal(glm::vec2 u) {
-    const float cos_max = std::cos(tilt_max_deg * pi / 180);
-    const float z = 1 - u.x * (1 - cos_max), radius = std::sqrt(std::max(0.0f, 1 - z * z)), phi = 2 * pi * u.y;
-    return {radius * std::cos(phi), radius * std::sin(phi), z};
 }
 
 bool reached(const ErrorFigures& f) {
@@ -149,8 +142,9 @@ Expected<double> keepLit(const RayScene& rays, const Pack& pack, uint32_t seed, 
 }
 
 Expected<void> checkSameLevel(const Scene& scene, const Pack& pack) {
+    const auto sets = static_cast<size_t>(std::ranges::count(pack.elements(), ElementKind::LightSet, &Element::kind));
     const bool same =
-        pack.elements().size() == scene.light_sets.size() + scene.doors.size() &&
+        sets == scene.light_sets.size() && pack.elements().size() == sets + scene.doors.size() &&
         std::ranges::equal(scene.light_sets, pack.elements().first(scene.light_sets.size()), {}, &SceneLightSet::name,
                            &Element::name) &&
         std::ranges::equal(scene.doors, pack.elements().last(scene.doors.size()), {}, &SceneDoor::name, &Element::name);
@@ -246,7 +240,7 @@ std::vector<VerifyPoint> choosePoints(const Pack& pack, const RayScene& rays, co
         if (t == triangles.end()) --t;
         VerifyPoint p = pointOn(pack, *t, {unitFloat(hash(seed, 4 * i + 1)), unitFloat(hash(seed, 4 * i + 2))});
         if (hidden(rays, p.position_m, p.frame, hash(seed, 4 * i + 3))) continue;
-        p.tilted = fromTangent(p.frame, tiltedNormal(sequence2d(i, hash(seed, 0x7117u))));
+        p.tilted = fromTangent(p.frame, uniformCapDirection(sequence2d(i, hash(seed, 0x7117u)), tilt_cos_min));
         points.push_back(p);
     }
     return points;

@@ -62,8 +62,8 @@ struct ModelPoint {
 ModelPoint modelPointOn(const Pack& pack, const ModelTriangle& t, glm::vec2 u) {
     const PlacedModel& model = pack.models()[t.model];
     const ModelMesh& mesh = pack.modelMeshes()[t.mesh];
-    const float root = std::sqrt(u.x);
-    const std::array weights{1 - root, root * (1 - u.y), root * u.y};
+    const glm::vec2 on = uniformOnTriangle(u);
+    const std::array weights{1 - on.x - on.y, on.x, on.y};
     ModelPoint out;
     out.slot = pack.localGridSlot(*model.local_grid);
     std::array<glm::vec3, 3> p;

@@ -254,7 +254,7 @@ class Placer {
         if (near_.anySeen(rays_, p, spacing_m)) return false;
         near_.add(p);
         probes_.places.push_back(place);
-        probes_.levels.push_back(static_cast<uint8_t>(level_));
+        probes_.levels.push_back(static_cast<uint8_t>(std::min(level_, 255u)));
         return true;
     }
 

@@ -41,6 +41,4 @@ class ReceiverGather {
     std::vector<uint32_t> active_, bounced_;  // terms; of the latter, light came from surfaces
 };
 
-using ProbeGather = ReceiverGather<ProbeLight>;
-
 }  // namespace dimmer::cook

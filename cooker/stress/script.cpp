@@ -92,7 +92,7 @@ void StressScript::changeElement() {
     if (kind < 6 || elements_[element].kind == ElementKind::Door) return setWeight(element, uniform(0, most));
     // Numbers that hurt: tiny ones, and one channel alone.
     if (kind == 6) return setWeight(element, std::exp2(uniform(-40, 0)) * most);
-    Weight colour(uniform(0, most), uniform(0, most), uniform(0, most));
+    Weight colour{uniform(0, most), uniform(0, most), uniform(0, most)};  // drawn in this order
     if (below(4) == 0) colour.g = colour.b = 0;
     setWeight(element, colour);
 }

@@ -13,7 +13,6 @@ namespace dimmer::cook {
 namespace {
 
 constexpr int updates_to_rest_max = 4;
-constexpr size_t words_per_probe = sizeof(ProbeRecord) / sizeof(uint32_t);
 
 // What the allocator merely keeps from the last check's fresh blend does not count.
 uint64_t bytesInUse() {

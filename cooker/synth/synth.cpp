@@ -170,7 +170,7 @@ Expected<GlobalGrid> randomGrid(size_t probes, SynthRandom& random) {
     for (size_t i = 0; i < inside; ++i) {
         const glm::vec3 cell(i % side, i / side % storeys, i / side / storeys);
         points[i] =
-            cell + glm::vec3(uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f));
+            cell + glm::vec3{uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f), uniform(random, -0.4f, 0.4f)};
         size = glm::max(size, cell);
     }
     return tetrahedralise(points, {glm::vec3(0), size});

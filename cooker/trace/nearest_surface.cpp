@@ -111,21 +111,8 @@ NearestSurface::NearestSurface(std::span<const Mesh> meshes, uint32_t page_width
                 impl_->triangles.push_back(t);
         }
     if (impl_->triangles.empty()) return;
-    RTCGeometry geometry = rtcNewGeometry(impl_->device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), impl_->triangles.size() * 3));
-    auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                                   3 * sizeof(unsigned), impl_->triangles.size()));
-    if (!positions || !indices) {
-        rtcReleaseGeometry(geometry);
-        throw std::bad_alloc();
-    }
-    for (size_t t = 0; t < impl_->triangles.size(); ++t)
-        for (size_t i = 0; i < 3; ++i) {
-            const glm::vec3 p = impl_->position(impl_->triangles[t], i);
-            for (int k = 0; k < 3; ++k) positions[(t * 3 + i) * 3 + static_cast<size_t>(k)] = p[k];
-            indices[t * 3 + i] = static_cast<unsigned>(t * 3 + i);
-        }
+    RTCGeometry geometry = newTriangles(impl_->device, impl_->triangles.size(),
+                                        [&](size_t t, int i) { return impl_->position(impl_->triangles[t], i); });
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(impl_->scene, geometry, 0);
     rtcReleaseGeometry(geometry);

@@ -139,24 +139,8 @@ struct RayScene::Embree {
     void attach(unsigned kind, const RayScene& level) {
         const auto& list = triangle_of[kind];
         if (list.empty()) return;
-        RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* positions = static_cast<float*>(rtcSetNewGeometryBuffer(
-            geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), list.size() * 3));
-        auto* indices = static_cast<unsigned*>(rtcSetNewGeometryBuffer(
-            geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(unsigned), list.size()));
-        if (!positions || !indices) {
-            rtcReleaseGeometry(geometry);
-            throw std::bad_alloc();
-        }
-        for (size_t t = 0; t < list.size(); ++t)
-            for (int i = 0; i < 3; ++i) {
-                const glm::vec3 p = level.corner(list[t], i);
-                const size_t vertex = t * 3 + static_cast<size_t>(i);
-                positions[vertex * 3] = p.x;
-                positions[vertex * 3 + 1] = p.y;
-                positions[vertex * 3 + 2] = p.z;
-                indices[vertex] = static_cast<unsigned>(vertex);
-            }
+        RTCGeometry geometry =
+            newTriangles(device.get(), list.size(), [&](size_t t, int i) { return level.corner(list[t], i); });
         rtcSetGeometryMask(geometry, 1u << kind);
         if (kind != opaque && kind != transparent) {
             const bool is_leaf = (mask_leaves >> kind & 1) != 0;

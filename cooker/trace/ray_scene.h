@@ -38,6 +38,14 @@ struct LevelTriangle {
 // What stops a ray: everything, with every leaf where it stands; or only what is always there.
 enum class Surfaces { All, Walls };
 
+// Where shadow rays end, so as not to hit the emitter that they aim at: short of it by more than a hit is rounded, and
+// no more than a millimetre until that is far more than a kilometre's rounding, or thin covers would let its light
+// through.
+inline float shadowEnd(float distance_m) {
+    constexpr float share = 1e-4f, most_m = 1e-3f, rounding = 2e-6f;
+    return distance_m - std::max(std::min(share * distance_m, most_m), rounding * distance_m);
+}
+
 // How far off a surface rays from a point of it start: so far, or further where floats are coarser than that.
 inline float liftOff(glm::vec3 point, float least_m) {
     constexpr float share = 4 * std::numeric_limits<float>::epsilon();

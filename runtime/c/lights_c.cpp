@@ -1,5 +1,6 @@
 // The C interface to the runtimes.
 #include <c/handles.h>
+#include <cpu/worker_pool.h>
 
 #include <dimmer/door.h>
 #include <fmt/format.h>
@@ -70,7 +71,7 @@ using namespace dimmer::c;
 dimmer_result dimmer_lights_create_cpu(const dimmer_pack* pack, uint32_t thread_count, uint32_t moving_probes_max,
                                        dimmer_lights** lights) {
     if (!given(pack, lights)) return DIMMER_INVALID_ARGUMENT;
-    constexpr uint32_t threads_max = 1024;
+    constexpr uint32_t threads_max = WorkerPool::threads_max;
     return guarded([&] {
         if (thread_count == 0 || thread_count > threads_max)
             return report({ErrorCode::InvalidArgument,

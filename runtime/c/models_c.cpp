@@ -26,14 +26,12 @@ Transform transformOf(const float world_from_model[12]) {
     return std::bit_cast<Transform>(rows);
 }
 
-constexpr size_t words_of_probe = sizeof(ProbeRecord) / sizeof(uint32_t);
-
 // Whether `word_count` words hold probes 0 .. probes - 1; reports it otherwise.
 bool holds(const uint32_t* words, size_t word_count, uint64_t probes) {
     if (probes > 0 && !given(words)) return false;
-    if (word_count / words_of_probe >= probes) return true;
+    if (word_count / words_per_probe >= probes) return true;
     report({ErrorCode::InvalidArgument,
-            fmt::format("{} words of probes were passed, {} are needed", word_count, probes * words_of_probe)});
+            fmt::format("{} words of probes were passed, {} are needed", word_count, probes * words_per_probe)});
     return false;
 }
 

@@ -15,11 +15,6 @@
 namespace dimmer {
 namespace {
 
-size_t texelIndex(const PackData& data, uint32_t address) {
-    return (size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address)) * data.page_width +
-           TexelAddress::x(address);
-}
-
 // Updates of fewer batches are over before another thread has woken up.
 constexpr size_t batches_per_thread_min = 256;
 // What a thread takes at a time: large beside the counter that it is taken by, small beside an update.
@@ -88,7 +83,7 @@ void blendProbes(std::span<const WorkItem> items, const WorkList& work, const Pa
                             term.weight_g, term.weight_b);
                 record = sum.encode();
             }
-            std::memcpy(&probes[size_t{7} * number], &record, sizeof(record));
+            std::memcpy(&probes[words_per_probe * number], &record, sizeof(record));
         }
     }
 }
@@ -97,8 +92,7 @@ void blendProbes(std::span<const WorkItem> items, const WorkList& work, const Pa
 
 CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads, uint32_t moving_probes_max)
     : LightState(pack, 1, moving_probes_max) {
-    constexpr uint32_t threads_max = 1024;  // hardware_concurrency() - 1 may be 4 billion, where that says 0
-    if (threads > 1) pool_ = std::make_unique<WorkerPool>(std::min(threads, threads_max));
+    if (threads > 1) pool_ = std::make_unique<WorkerPool>(std::min(threads, WorkerPool::threads_max));
     const PackData& data = pack.data();
     irradiance_.resize(data.base_pages.size());
     direction_.resize(data.base_pages.size());
@@ -107,11 +101,11 @@ CpuRuntime::CpuRuntime(const Pack& pack, uint32_t threads, uint32_t moving_probe
         irradiance_[i] = base.irradiance;
         direction_[i] = base.direction;
     }
-    probes_.resize(7 * (data.probes.base.size() + models().probesMax()));
+    probes_.resize(words_per_probe * (data.probes.base.size() + models().probesMax()));
     hints_.assign(models().probesMax(), no_tetrahedron);
     for (size_t i = 0; i < data.probes.base.size(); ++i) {
         const ProbeRecord base = canonicalProbe(data.color_format, data.probes.base[i]);
-        std::memcpy(&probes_[7 * i], &base, sizeof(base));
+        std::memcpy(&probes_[words_per_probe * i], &base, sizeof(base));
     }
     for (uint32_t address : data.addresses) base_.push_back(data.base_pages[texelIndex(data, address)]);
 }

@@ -58,12 +58,8 @@ std::array<float, 3> sampleLightmap(const Pack& pack, std::span<const uint32_t> 
     const Sample s = mix(mix(texel(x.first, y.first), texel(x.second, y.first), x.second_share),
                          mix(texel(x.first, y.second), texel(x.second, y.second), x.second_share), y.second_share);
 
-    const Highlight h = highlightFromUnorm(s[3], s[4], s[5]);
-    const float highlight =
-        h.bx * normal_tangent[0] + h.by * normal_tangent[1] + (1.0f - h.ambient) * normal_tangent[2];
-    const float falloff = pack.directionModel() == DirectionModel::Ahd ? h.ambient + std::max(0.0f, highlight)
-                                                                       : std::max(0.0f, h.ambient + highlight);
-    const float scale = falloff / pack.exposure();
+    const float scale =
+        falloff(pack.directionModel(), highlightFromUnorm(s[3], s[4], s[5]), normal_tangent) / pack.exposure();
     return {s[0] * scale, s[1] * scale, s[2] * scale};
 }
 

@@ -11,6 +11,9 @@ namespace dimmer {
 
 class WorkerPool {
    public:
+    // More help nobody; hardware_concurrency() - 1 may be 4 billion, where that says 0.
+    static constexpr uint32_t threads_max = 1024;
+
     // The caller works too, so one thread fewer is started; fewer still where the system refuses, threads() says.
     explicit WorkerPool(uint32_t threads);
     ~WorkerPool();

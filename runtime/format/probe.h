@@ -14,7 +14,8 @@
 
 namespace dimmer {
 
-inline constexpr uint32_t probe_codes = 24, probe_words = 6;
+inline constexpr uint32_t probe_codes = 24, probe_words = 6;  // of the bands
+inline constexpr size_t words_per_probe = 1 + probe_words;
 
 // Sums records with weights in 32-bit floats and encodes once. Order of the calls is part of the result.
 template <ColorFormat format>
@@ -61,9 +62,9 @@ inline ProbeRecord canonicalProbe(ColorFormat format, const ProbeRecord& record)
     return {canonical(format, {record.light, 0}).irradiance, record.bands};
 }
 
-// Of blended probes, 7 words each.
+// Of blended probes, words_per_probe each.
 inline ProbeRecord probeAt(std::span<const uint32_t> words, uint32_t number) {
-    const uint32_t* w = &words[size_t{1 + probe_words} * number];
+    const uint32_t* w = &words[words_per_probe * number];
     return {w[0], {w[1], w[2], w[3], w[4], w[5], w[6]}};
 }
 

@@ -28,8 +28,7 @@ namespace dimmer {
 
 inline constexpr float luminance_r = 0.2126f, luminance_g = 0.7152f, luminance_b = 0.0722f;
 // A sunlit snow field to a moonless night, and then some: light over the exposure stays far from a float's limits.
-inline constexpr int exposure_log2_max = 40;    // and no less than its negative
-inline constexpr float highlight_z_min = 0.1f;  // closer to the surface, b would outgrow its 10 bits
+inline constexpr int exposure_log2_max = 40;  // and no less than its negative
 
 inline float luminance(float r, float g, float b) {
     return luminance_r * r + luminance_g * g + luminance_b * b;
@@ -141,6 +140,12 @@ inline Highlight highlightFromUnorm(float ambient, float x, float y) {
 inline Highlight decodeDirection(uint32_t code) {
     const auto moment = [](uint32_t c) { return static_cast<float>(static_cast<int>(c) - 512) * moment_step; };
     return {static_cast<float>(code & 0x3ff) / 1023.0f, moment(code >> 10 & 0x3ff), moment(code >> 20 & 0x3ff)};
+}
+
+// E(n) / E(+Z) as a model has it, for a unit normal in the texel's tangent space.
+inline float falloff(DirectionModel model, const Highlight& h, const std::array<float, 3>& n) {
+    const float highlight = h.bx * n[0] + h.by * n[1] + (1.0f - h.ambient) * n[2];
+    return model == DirectionModel::Ahd ? h.ambient + std::max(0.0f, highlight) : std::max(0.0f, h.ambient + highlight);
 }
 
 // l E_z's luminance, `ambient` = l r, (bx, by) = l b.

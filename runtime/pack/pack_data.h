@@ -104,6 +104,12 @@ struct PackData {
     ReceiverView texelView() const { return {clusters, terms, batches, sizeof(TexelRecord), 1}; }
 };
 
+// Of base_pages, and of pages like them.
+inline size_t texelIndex(const PackData& data, uint32_t address) {
+    return (size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address)) * data.page_width +
+           TexelAddress::x(address);
+}
+
 // Checks everything that an executor relies on: every index in range, clusters and batches tile the receivers,
 // addresses inside the pages and unique, finite floats. Linear in the size of the data.
 Expected<void> validate(const PackData& data);

@@ -13,7 +13,7 @@ namespace {
 
 // Whether `words` hold the probes 0 .. end - 1.
 bool holds(std::span<const uint32_t> words, uint64_t end) {
-    return words.size() / (sizeof(ProbeRecord) / sizeof(uint32_t)) >= end;
+    return words.size() / words_per_probe >= end;
 }
 
 // One past a slot's last probe; past all probes where it is no slot, as that of a local grid that is not there.

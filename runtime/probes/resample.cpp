@@ -42,7 +42,7 @@ void resampleItem(const PackData& data, const ResampleItem& item, uint32_t first
                                             item.origin_z + x * item.step_x_z + y * item.step_y_z + z * item.step_z_z};
         const uint32_t number = item.first_probe + i;
         const ProbeRecord probe = resampleProbe(data, probes, point, hints[number - first_moving]);
-        std::memcpy(&probes[size_t{1 + probe_words} * number], &probe, sizeof(probe));
+        std::memcpy(&probes[words_per_probe * number], &probe, sizeof(probe));
     }
 }
 

@@ -62,9 +62,7 @@ std::vector<float> quantaPerWeight(const PackData& data) {
     std::vector<float> quanta(data.terms.size(), 0);
     for (const Cluster& c : data.clusters)
         for (uint32_t i = 0; i < c.receiver_count; ++i) {
-            const uint32_t address = data.addresses[c.first_receiver + i];
-            const size_t row = size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address);
-            const TexelRecord& base = data.base_pages[row * data.page_width + TexelAddress::x(address)];
+            const TexelRecord& base = data.base_pages[texelIndex(data, data.addresses[c.first_receiver + i])];
             const auto steps = stepsAt(format, canonical(format, base).irradiance);
             for (uint32_t t = c.first_term; t < c.first_term + c.term_count; ++t) {
                 const TexelRecord& record = data.payload[data.terms[t].first_record + i];

@@ -1,4 +1,5 @@
 // Light at places where probes may stand, as a cook keeps it.
+#include <cache/entries.h>
 #include <gtest/gtest.h>
 #include <pipeline/cook_cache.h>
 #include <scene/level_file.h>
@@ -51,6 +52,35 @@ TEST(SiteEntries, AreFewAndComeBackBlockByBlock) {
     EXPECT_LT(known(), 68u);
     EXPECT_GE(known(), 65u);
     EXPECT_FALSE(cache.lines().back().reused);
+}
+
+// A place in sight of very many doors.
+TEST(SiteEntries, ARowMayBeLongerThan16BitsCount) {
+    constexpr uint32_t terms = 70000;
+    const std::array light{Sparse<ProbeTermLight>::build(2, [](size_t begin, size_t end, auto emit) {
+        std::vector<ProbeTermLight> row(terms);
+        for (uint32_t t = 0; t < terms; ++t) row[t].term = t;
+        for (size_t i = begin; i < end; ++i) emit(std::span(row).first(i == 0 ? terms : 1));
+    })};
+    const auto found = siteLightFromBytes(toBytes(light), 1);
+    ASSERT_TRUE(found);
+    ASSERT_EQ(found->front().rows(), 2u);
+    ASSERT_EQ(found->front().row(0).size(), terms);
+    EXPECT_EQ(found->front().row(0).back().term, terms - 1);
+    EXPECT_EQ(found->front().row(1).size(), 1u);
+}
+
+// Of whole bytes, and yet nothing that this build reads: a line must not say that it was used.
+TEST(SiteEntries, WhatCannotBeReadWasNotFound) {
+    const TemporaryFolder folder;
+    const Key key = KeyBuilder("charts").finish();
+    const std::array<std::byte, 3> nonsense{};
+    ASSERT_TRUE(CacheStore::open(folder.path)->keep("charts", key, nonsense));
+    CookCache cache(*CacheStore::open(folder.path), folder.path / "level.dimmer");
+    EXPECT_FALSE(cache.findCharts(key));
+    ASSERT_EQ(cache.lines().size(), 1u);
+    EXPECT_FALSE(cache.lines()[0].reused);
+    EXPECT_EQ(cache.lines()[0].why, "the entry is damaged");
 }
 
 }  // namespace

@@ -65,13 +65,18 @@ TEST(WallCuts, WallsAtTheEndOfALevelAreNoSkins) {
     addQuad(scene, "floor", {0, 0, 0}, {0, 0, half.z + 0.2f}, {half.x + 0.2f, 0, 0}, grey);
     addSolid(scene, "ceiling", {0, 2 * half.y + 0.1f, 0}, {half.x + 0.2f, 0.1f, half.z + 0.2f}, grey);
     cutAtWalls(scene, 4);
+    uint32_t cuts_x = 0, cuts_z = 0;
     for (const SceneMesh& mesh : scene.meshes)
         for (const glm::vec3 p : mesh.positions_m) {
-            const bool in_room = std::abs(p.x) < half.x + 0.05f && std::abs(p.z) < half.z + 0.05f;
-            if (mesh.node != "floor" || !in_room) continue;
+            if (mesh.node != "floor") continue;
+            cuts_x += std::abs(std::abs(p.x) - half.x - 0.1f) < 1e-3f;
+            cuts_z += std::abs(std::abs(p.z) - half.z - 0.1f) < 1e-3f;
+            if (std::abs(p.x) >= half.x + 0.05f || std::abs(p.z) >= half.z + 0.05f) continue;
             EXPECT_GT(half.x - std::abs(p.x), 0.01f) << p.z;
             EXPECT_GT(half.z - std::abs(p.z), 0.01f) << p.x;
         }
+    EXPECT_GE(cuts_x, 4u);
+    EXPECT_GE(cuts_z, 4u);
 }
 
 // A building that does not stand along the world's axes has its charts along its own: of floors too, which have no

@@ -84,7 +84,7 @@ class TruthTwoRooms : public testing::Test {
     std::optional<Pack> pack_;
 };
 
-TEST_F(TruthTwoRooms, DraftMeanErrorIsAtMostTenPerCent) {
+TEST_F(TruthTwoRooms, DraftMeanErrorIsAtMostFivePerCent) {
     const double floor_lux = truthFloor(readTruth("two_rooms.surface.all_on"));
     for (const auto& [name, state] : {std::pair("all_on", ""), {"all_off", "all=0"}, {"only_first", "all=0,desk=1"}}) {
         const auto truth = readTruth(std::string("two_rooms.surface.") + name);

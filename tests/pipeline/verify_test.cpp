@@ -251,6 +251,13 @@ TEST(Verify, AnswersWhatItCannotMeasure) {
     Scene other = scene;
     other.light_sets[0].name = "gleam";
     EXPECT_EQ(verify(other, *pack, quick(), progress).error().code, ErrorCode::BadInput);
+    Scene door = scene;  // of the set's name
+    for (SceneMesh& mesh : door.meshes) mesh.light_set.reset();
+    door.light_sets.clear();
+    door.doors = {{.name = "glow"}};
+    const auto other_kind = verify(door, *pack, quick(), progress);
+    ASSERT_FALSE(other_kind);
+    EXPECT_EQ(other_kind.error().code, ErrorCode::BadInput);
     Scene black = scene;
     for (Material& m : black.materials) m.emission_cd_m2 = glm::vec3(0);
     const auto dark = cooked(black, "draft");
