@@ -45,7 +45,7 @@ class Surroundings {
             // The foot of a door's leaf often lies in the floor's plane, and shows through it from below.
             if (triangle.condition != no_condition && !back) return;
             std::optional<Hit> behind;
-            if (!back && rays_.liesOnBack(hit, from_m, direction)) {
+            if (!back && rays_.liesOnBack(hit, from_m, direction, Surfaces::All, ignored_)) {
                 from_m += direction * (hit.distance_m + liftOff(from_m, past_touching_m));
                 behind = rays_.nearest(from_m, direction, far_away_m, seed, Surfaces::All, ignored_);
             }

@@ -303,10 +303,11 @@ std::optional<Hit> RayScene::nearest(glm::vec3 origin, glm::vec3 direction, floa
     return found;
 }
 
-bool RayScene::liesOnBack(const Hit& hit, glm::vec3 origin, glm::vec3 direction, Surfaces surfaces) const {
+bool RayScene::liesOnBack(const Hit& hit, glm::vec3 origin, glm::vec3 direction, Surfaces surfaces,
+                          uint32_t ignored) const {
     const Embree& among = embree(surfaces);
     RTCRayHit back;
-    if (!among.meet(back, origin, direction, hit.distance_m, no_model, leaveOutFronts)) return false;
+    if (!among.meet(back, origin, direction, hit.distance_m, ignored, leaveOutFronts)) return false;
     const uint32_t triangle = among.triangle_of[back.hit.geomID][back.hit.primID];
     return !scene_.materials[triangles_[triangle].material].double_sided;
 }

@@ -94,7 +94,8 @@ class RayScene {
 
     // Whether the front that a ray met lies in one place with the back of something single-sided, as where solids
     // touch. Costs a short ray.
-    bool liesOnBack(const Hit& hit, glm::vec3 origin, glm::vec3 direction, Surfaces surfaces = Surfaces::All) const;
+    bool liesOnBack(const Hit& hit, glm::vec3 origin, glm::vec3 direction, Surfaces surfaces = Surfaces::All,
+                    uint32_t ignored = no_model) const;
 
     // How far any light gets along a ray at most: to the nearest surface that lets none of it pass.
     float reach(glm::vec3 origin, glm::vec3 direction, float distance_max_m, Surfaces surfaces) const;

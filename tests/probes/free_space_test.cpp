@@ -45,6 +45,23 @@ TEST(FreeSpace, NoPlaceWithinSolidsThatTouch) {
     EXPECT_TRUE(inTheOpen(rays, {0.5f, 0, -2.5f}));
 }
 
+// A lamp's pane in a niche whose back it touches: without the pane the niche is open to its back.
+TEST(FreeSpace, AModelThatIsNotThereTouchesNothing) {
+    Scene scene;
+    const uint32_t grey = addMaterial(scene, lambert(0.5f));
+    addBox(scene, {0.5f, 0.5f, 0.5f}, grey);
+    addSolid(scene, "pane", {0, 0, 0.45f}, {0.5f, 0.5f, 0.05f}, grey);
+    SceneModel pane;
+    for (uint32_t m = 6; m < scene.meshes.size(); ++m) {
+        pane.meshes.push_back(m);
+        scene.meshes[m].lighting = Lighting::LocalGrid;
+    }
+    scene.models = {pane};
+    const RayScene rays(scene);
+    EXPECT_FALSE(inTheOpen(rays, {0.1f, 0.1f, 0.44f}));
+    EXPECT_TRUE(inTheOpen(rays, {0.1f, 0.1f, 0.44f}, 0));
+}
+
 // Rooms whose walls have no thickness, beside each other and in a hull that faces outwards.
 TEST(FreeSpace, RoomsOfPaperAreOpen) {
     Scene scene;
