@@ -51,12 +51,8 @@ TEST(FreeSpace, AModelThatIsNotThereTouchesNothing) {
     const uint32_t grey = addMaterial(scene, lambert(0.5f));
     addBox(scene, {0.5f, 0.5f, 0.5f}, grey);
     addSolid(scene, "pane", {0, 0, 0.45f}, {0.5f, 0.5f, 0.05f}, grey);
-    SceneModel pane;
-    for (uint32_t m = 6; m < scene.meshes.size(); ++m) {
-        pane.meshes.push_back(m);
-        scene.meshes[m].lighting = Lighting::LocalGrid;
-    }
-    scene.models = {pane};
+    addSolid(scene, "rock", {0, 0, 0}, {3, 3, 3}, grey);  // that the niche is in
+    for (size_t m = 6; m < 12; ++m) scene.meshes[m].model = 0;
     const RayScene rays(scene);
     EXPECT_FALSE(inTheOpen(rays, {0.1f, 0.1f, 0.44f}));
     EXPECT_TRUE(inTheOpen(rays, {0.1f, 0.1f, 0.44f}, 0));
