@@ -29,12 +29,18 @@ constexpr double lamp_reach_spacings = 2.2;
 // are all behind a wall or a floor is found by nothing else (that strip is a thousandth of a room).
 constexpr double share_at_surfaces = 0.2;
 constexpr float off_surface_min_m = 0.055f, off_surface_max_m = 0.085f;  // beyond probe_clearance_m
-constexpr glm::vec3 nowhere(std::numeric_limits<float>::quiet_NaN());    // in no box
+// And so many on both sides of doors' leaves, as far as that: no probe looks through a leaf that may close, so those on
+// either side tell of its open doorway by themselves, where light changes over less than a metre.
+constexpr double share_at_doors = 0.1;
+constexpr uint32_t places_per_door_max = 400;
+constexpr float off_leaf_max_m = 0.5f;
+constexpr glm::vec3 nowhere(std::numeric_limits<float>::quiet_NaN());  // in no box
 constexpr float lamp_reach_min_m = 0.8f;
 // Light changes over lengths like the distance to surfaces (Ward and Heckbert 1992), and what asks for it moves near
 // them: places farther off than this many times the mean spacing of probes become rarer.
 constexpr double near_spacings = 0.8;
-constexpr uint32_t rarity_seed = 0x2c1b3c6du, surface_seed = 0x1f123bb5u, lamp_place_seed = 0x51ed270bu;
+constexpr uint32_t rarity_seed = 0x2c1b3c6du, surface_seed = 0x1f123bb5u, lamp_place_seed = 0x51ed270bu,
+                   door_place_seed = 0x7a1c9e35u;
 // Small levels get up to four times the rays from each place, while all of them are no more than so many places' usual
 // ones: noise misleads where to put the few probes they have.
 constexpr uint32_t small_level_places = 15625, small_level_factor = 4;
@@ -48,6 +54,12 @@ class Chooser {
             if (light.type != LightType::Directional && light.bake != BakeMode::None &&
                 std::ranges::find(lamps_, light.position_m) == lamps_.end())
                 lamps_.push_back(light.position_m);
+        const auto triangles = rays.triangles();
+        leaves_.resize(rays.scene().doors.size());
+        for (uint32_t t = 0; t < triangles.size(); ++t)
+            if (const uint32_t condition = triangles[t].condition; condition != no_condition && condition % 2 == 0)
+                leaves_[condition / 2].push_back(t);
+        std::erase_if(leaves_, [](const auto& leaf) { return leaf.empty(); });
     }
 
     Expected<SiteChoice> run() {
@@ -57,8 +69,13 @@ class Chooser {
         const uint32_t rays = (affordable + 1) / 2 * 2;  // in two halves
         const auto at_lamps = lamps_.empty() ? 0 : static_cast<uint32_t>(share_near_lamps * wanted);
         const auto at_surfaces = settings_.uniform ? 0 : static_cast<uint32_t>(share_at_surfaces * (wanted - at_lamps));
-        out_.blocks.push_back({allOver(wanted - at_lamps - at_surfaces), rays});
+        const uint32_t at_doors = settings_.uniform
+                                      ? 0
+                                      : std::min(static_cast<uint32_t>(share_at_doors * (wanted - at_lamps)),
+                                                 static_cast<uint32_t>(leaves_.size()) * places_per_door_max);
+        out_.blocks.push_back({allOver(wanted - at_lamps - at_surfaces - at_doors), rays});
         out_.blocks.push_back({atSurfaces(at_surfaces), rays});
+        if (at_doors > 0) out_.blocks.push_back({atDoors(at_doors), rays});
         const auto lamps = static_cast<uint32_t>(lamps_.size());
         for (const glm::vec3 lamp : lamps_)
             if (const uint32_t count = (at_lamps + lamps - 1) / lamps; count > 0)
@@ -148,6 +165,28 @@ class Chooser {
         }
         return p;
     }
+    std::vector<glm::vec3> atDoors(uint32_t count) const {
+        return sites({static_cast<float>(count), near_m_, off_surface_min_m, off_leaf_max_m}, count,
+                     [&](uint32_t i) { return atDoor(i); });
+    }
+    // The doors in turns; off any of a leaf's triangles, by its area, to either side.
+    glm::vec3 atDoor(uint32_t i) const {
+        const std::vector<uint32_t>& leaf = leaves_[i % leaves_.size()];
+        std::vector<float> areas;
+        for (const uint32_t t : leaf) {
+            const glm::vec3 a = rays_.corner(t, 0);
+            const glm::vec3 cross = glm::cross(rays_.corner(t, 1) - a, rays_.corner(t, 2) - a);
+            areas.push_back((areas.empty() ? 0 : areas.back()) + 0.5f * glm::length(cross));
+        }
+        const uint32_t seed = hash(i, door_place_seed);
+        const float at = areas.back() * unitFloat(hash(seed, 0));
+        const auto chosen =
+            std::min(static_cast<size_t>(std::ranges::upper_bound(areas, at) - areas.begin()), leaf.size() - 1);
+        const glm::vec2 on = uniformOnTriangle(sequence2d(i, door_place_seed));
+        const float side = hash(seed, 1) % 2 == 0 ? 1.0f : -1.0f;
+        const float off_m = glm::mix(off_surface_min_m, off_leaf_max_m, unitFloat(hash(seed, 2)));
+        return rays_.pointOn(leaf[chosen], on.x, on.y) + side * off_m * rays_.triangles()[leaf[chosen]].normal;
+    }
     std::vector<glm::vec3> around(glm::vec3 lamp_m, uint32_t count) const {
         return sites({static_cast<float>(count), near_m_, lamp_reach_m_, lamp_m.x, lamp_m.y, lamp_m.z}, count,
                      [&](uint32_t i) { return nearLamp(lamp_m, i); });
@@ -214,6 +253,7 @@ class Chooser {
     const GridSettings& settings_;
     GroupStore* store_;
     std::vector<glm::vec3> lamps_;
+    std::vector<std::vector<uint32_t>> leaves_;  // per door that has any: the triangles of its closed leaf
     float lamp_reach_m_ = 0, near_m_ = 0;
     SiteChoice out_;
 };
