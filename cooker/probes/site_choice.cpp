@@ -31,7 +31,7 @@ constexpr double share_at_surfaces = 0.2;
 constexpr float off_surface_min_m = 0.055f, off_surface_max_m = 0.085f;  // beyond probe_clearance_m
 // And so many on both sides of doors' leaves, as far as that: no probe looks through a leaf that may close, so those on
 // either side tell of its open doorway by themselves, where light changes over less than a metre.
-constexpr double share_at_doors = 0.1;
+constexpr double share_at_doors = 0.2;
 constexpr uint32_t places_per_door_max = 400;
 constexpr float off_leaf_max_m = 0.5f;
 constexpr glm::vec3 nowhere(std::numeric_limits<float>::quiet_NaN());  // in no box

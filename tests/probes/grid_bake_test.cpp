@@ -173,6 +173,67 @@ TEST(GridBake, LightStaysInItsRoom) {
     EXPECT_GE(unseen, 0.0004);  // the test can tell
 }
 
+// Two rooms, a lamp in the first, and a door in the wall between them, of which the second has all its light.
+Scene roomsWithADoor(bool leaf) {
+    Scene scene;
+    const uint32_t white = addMaterial(scene, lambert(0.6f));
+    addRoom(scene, {0, 0, 0}, {8.2f, 2.6f, 4}, white);
+    addSolid(scene, "wall", {4.1f, 1.3f, 0.75f}, {0.1f, 1.3f, 0.75f}, white);
+    addSolid(scene, "wall", {4.1f, 1.3f, 3.25f}, {0.1f, 1.3f, 0.75f}, white);
+    addSolid(scene, "lintel", {4.1f, 2.3f, 2}, {0.1f, 0.3f, 0.5f}, white);
+    if (leaf) {
+        scene.doors = {{"gate", false}};
+        addSolid(scene, "leaf", {4.1f, 1, 2}, {0.02f, 1, 0.5f}, white, 0);
+    }
+    addPointLight(scene, {2.2f, 2.2f, 1.2f}, 100, BakeMode::Indirect);
+    return scene;
+}
+
+// Along eight lines through the doorway, the largest ratio of what `lux` says of places 5 cm apart.
+double largestStepInTheDoorway(auto&& lux) {
+    double largest = 1;
+    for (uint32_t line = 0; line < 8; ++line) {
+        double before = 0;
+        for (float x = 3.75f; x < 4.46f; x += 0.05f) {
+            const double here = lux(glm::vec3(x, 0.6f + 0.25f * static_cast<float>(line % 4), line < 4 ? 1.8f : 2.25f));
+            if (before > 0) largest = std::max({largest, here / before, before / here});
+            before = here;
+        }
+    }
+    return largest;
+}
+
+// Upwards; all terms but those that ask for a closed door.
+double openLuxAt(const Baked& baked, glm::vec3 p) {
+    const GridPlace place = locate(baked.grid.grid, {p.x, p.y, p.z});
+    const auto weights = probeWeights(baked.grid.grid, place);
+    float lux = 0;
+    for (size_t k = 0; k < 4; ++k)
+        for (const ProbeTermLight& l : baked.grid.light.row(baked.grid.grid.tetrahedra[place.tetrahedron].probes[k]))
+            if (baked.terms[l.term].doors_closed.empty()) lux += weights[k] * l.light.irradiance({0, 1, 0}).x;
+    return static_cast<double>(lux);
+}
+
+// No probe looks through the leaf, which may close. Where none stood near it light fell to a half or a fifth there.
+TEST(GridBake, LightDoesNotJumpInAnOpenDoorway) {
+    const Scene open = roomsWithADoor(false);
+    const RayScene rays(open);
+    const ReferenceTracer tracer(rays, {.seed = 1, .set_weights = {}});
+    const double wanted = largestStepInTheDoorway([&](glm::vec3 p) {
+        return static_cast<double>(tracer.irradiance({p, {0, 1, 0}}, 4096).irradiance_lux.x);
+    });
+    printf("largest step of 5 cm in the open doorway: times %.2f\n", wanted);
+    for (const uint32_t seed : {1u, 2u, 3u}) {
+        BakedScene level(roomsWithADoor(true), 2);
+        BakeSettings settings = settingsWithGrid(140);  // one for each m3, and some
+        settings.seed = seed;
+        level.bake(settings);
+        const double step = largestStepInTheDoorway([&](glm::vec3 p) { return openLuxAt(level.baked, p); });
+        printf("of the grid: times %.2f\n", step);
+        EXPECT_LE(step, 1.5 * wanted);
+    }
+}
+
 // The light of a small window in a black hall, found over expected. Nobody asks the emitter for itself here, so that
 // few rays find it; it is small and far enough to be a point: L_00 of radiance L over the solid angle A cos / d^2.
 double shareOfWindowsLight(uint32_t site_rays) {
