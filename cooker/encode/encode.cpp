@@ -115,6 +115,32 @@ TexelRecord encodeTexel(const Gathered& light, const TexelEncoding& encoding) {
             encodeDirection(1, fit.ambient, fit.bx, fit.by)};
 }
 
+namespace {
+
+// visit(row, valueOf): what is stored in a colour format of each receiver's terms.
+void forEachRow(const Baked& baked, auto&& visit) {
+    for (size_t i = 0; i < baked.light.rows(); ++i)
+        visit(baked.light.row(i), [](const Gathered& light) { return light.irradiance_lux; });
+    for (const auto* probes : {&baked.grid.light, &baked.local_light})
+        for (size_t i = 0; i < probes->rows(); ++i)
+            visit(probes->row(i), [](const ProbeLight& light) { return light.radiance[0]; });
+}
+
+}  // namespace
+
+uint32_t brightestTerm(const Baked& baked, std::span<const float> max_weights) {
+    uint32_t brightest = 0;
+    double largest = 0;
+    forEachRow(baked, [&](const auto& row, auto&& valueOf) {
+        for (const auto& l : row) {
+            const glm::dvec3 value = static_cast<double>(max_weights[l.term]) * glm::dvec3(valueOf(l.light));
+            const double most = std::max({value.x, value.y, value.z});
+            if (most > largest) largest = most, brightest = l.term;
+        }
+    });
+    return brightest;
+}
+
 float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
     constexpr double half_of_largest = 64512.0 / 2;  // of R11G11B10F's 10-bit channel, the smallest of both formats
     double largest = 0;
@@ -128,11 +154,7 @@ float chooseExposure(const Baked& baked, std::span<const float> max_weights) {
         }
         largest = std::max({largest, sum.x, sum.y, sum.z});
     };
-    for (size_t i = 0; i < baked.light.rows(); ++i)
-        consider(baked.light.row(i), [](const Gathered& light) { return light.irradiance_lux; });
-    for (const auto* probes : {&baked.grid.light, &baked.local_light})
-        for (size_t i = 0; i < probes->rows(); ++i)
-            consider(probes->row(i), [](const ProbeLight& light) { return light.radiance[0]; });
+    forEachRow(baked, consider);
     if (!(largest > 0)) return 1;
     constexpr double most = exposure_log2_max;
     return static_cast<float>(std::exp2(std::clamp(std::floor(std::log2(half_of_largest / largest)), -most, most)));

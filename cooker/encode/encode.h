@@ -23,5 +23,7 @@ TexelRecord encodeTexel(const Gathered& light, const TexelEncoding& encoding);
 // The power of two that keeps every record, and the largest value reachable with every weight at its maximum, below
 // half of the format's largest number. `max_weights`: per term, that of its light set; 1 for always-on light.
 float chooseExposure(const Baked& baked, std::span<const float> max_weights);
+// Whose light at its largest weight is the brightest of all at some place: the exposure is its doing.
+uint32_t brightestTerm(const Baked& baked, std::span<const float> max_weights);
 
 }  // namespace dimmer::cook

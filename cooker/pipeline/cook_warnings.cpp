@@ -1,5 +1,6 @@
 #include <pipeline/cook_warnings.h>
 
+#include <bake/door_paths.h>
 #include <bake/punctual.h>
 #include <bake/sampling.h>
 
@@ -22,22 +23,23 @@ float widthM(const SceneMesh& mesh) {
 
 }  // namespace
 
-std::optional<std::string> coarseExposure(const Scene& scene, float exposure) {
+std::optional<std::string> coarseExposure(const Scene& scene, float exposure, uint32_t group) {
     constexpr float smallest = 0x1p-14f;  // what both colour formats store with a step of a few per cent
     constexpr float dark_lux = 1;
     const float lost_lux = smallest / exposure;
     if (lost_lux <= dark_lux) return {};
-    const auto sets = std::span(scene.light_sets);
-    const auto largest = std::ranges::max_element(sets, {}, &SceneLightSet::max_weight);
-    const std::string cause = largest != sets.end() && largest->max_weight > 1
-                                  ? fmt::format(
-                                        "light set '{}' has a dimmer_max_weight of {:.3g}; give it the largest that "
-                                        "the game sets",
-                                        largest->name, largest->max_weight)
-                                  : "some light is that bright; correct its intensity";
+    std::string cause = "light that is always on is that bright; correct its intensity";
+    if (group != always_group) {
+        const SceneLightSet& set = scene.light_sets[group - 1];
+        cause = fmt::format("light set '{}' is that bright; correct its intensity", set.name);
+        if (set.max_weight > 1)
+            cause +=
+                fmt::format(", or its dimmer_max_weight of {:.3g}, if that is more than the game sets", set.max_weight);
+    }
     return fmt::format(
-        "{}: light below {:.3g} lux is stored coarsely or as black, to leave room for all sets at their "
-        "largest weight: {}",
+        "{}: light below {:.3g} lux is stored coarsely or as black, to leave room for all sets at their largest "
+        "weight: "
+        "{}",
         scene.file, lost_lux, cause);
 }
 

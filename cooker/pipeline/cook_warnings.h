@@ -13,8 +13,8 @@
 namespace dimmer::cook {
 
 // The exposure leaves room for every set at its largest weight at once; an absurd one leaves the rest of the level
-// black.
-std::optional<std::string> coarseExposure(const Scene& scene, float exposure);
+// black. `group`: the light group that is the brightest somewhere.
+std::optional<std::string> coarseExposure(const Scene& scene, float exposure, uint32_t group);
 
 // Coordinates are floats: far from the origin a step of theirs comes near what keeps rays off walls, until these are
 // lit from behind themselves.

@@ -38,8 +38,16 @@ class ElementWarnings {
         for (uint32_t t = 0; t < baked_.terms.size(); ++t) {
             const Term& term = baked_.terms[t];
             if (baked_.reports[t].receivers > 0 || !term.free() || term.group == always_group) continue;
+            const auto shines = [&](const PunctualLight& light) {
+                return light.light_set == term.group - 1 && light.intensity != glm::vec3(0);
+            };
+            const bool dark =
+                std::ranges::none_of(scene_.lights, shines) &&
+                std::ranges::none_of(scene_.meshes, [&](const SceneMesh& m) { return m.light_set == term.group - 1; });
             add(fmt::format("light set '{}' {}", scene_.light_sets[term.group - 1].name,
-                            baked_.reports[t].energy > 0 ? below : "reaches no surface; it is kept, and does nothing"));
+                            baked_.reports[t].energy > 0 ? below
+                            : dark ? "has lights of intensity 0 alone; it is kept, and does nothing"
+                                   : "reaches no surface; it is kept, and does nothing"));
         }
     }
 

@@ -69,7 +69,8 @@ PackData encodePack(const ChartedLevel& level, const Texels& texels, const Baked
     pack.color_format = profile.color_format;
     pack.direction_model = profile.direction_model;
     pack.exposure = chooseExposure(baked, max_weights);
-    if (auto warning = coarseExposure(scene, pack.exposure)) stats.warnings.push_back(std::move(*warning));
+    if (auto warning = coarseExposure(scene, pack.exposure, baked.terms[brightestTerm(baked, max_weights)].group))
+        stats.warnings.push_back(std::move(*warning));
     buildClusters(texels, baked, contribution_of_term, profile.overlap_max, pack);
     buildProbeClusters(baked, contribution_of_term, profile.overlap_max, pack);
     pack.probes.local = localGrids(scene, static_cast<uint32_t>(pack.probes.global.positions.size()));

@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <format/layout.h>
 #include <scene/gltf_file.h>
 #include <scene/json_types.h>
 #include <scene/uri.h>
@@ -128,12 +129,13 @@ struct ExternalFiles {
     std::map<std::string, std::string>
         meant;                             // by the path that the parser makes of a URI, the one that it means, or none
     std::map<std::string, size_t> length;  // per such path, what all buffers there have
+    std::string unread;                    // why the first buffer's file that could not be read could not
 };
 
 // The parser takes a '+' for a blank, and a buffer's file that is longer than the buffer for an error; it may be longer
 // (glTF 2.0 specification, "Buffers and Buffer Views").
 ExternalFiles externalFiles(std::string_view gltf_json, std::string folder) {
-    ExternalFiles files{std::move(folder), {}, {}};
+    ExternalFiles files{std::move(folder), {}, {}, {}};
     const auto json = nlohmann::json::parse(gltf_json, nullptr, false);
     for (const char* list : {"buffers", "images"}) {
         const auto all = json.is_object() ? json.find(list) : json.end();
@@ -179,6 +181,8 @@ bool readExternal(Bytes* out, std::string* message, const std::string& path, voi
     } else if (message) {
         *message = bytes.error().message;
     }
+    auto& [folder, meant, length, unread] = *static_cast<ExternalFiles*>(files);
+    if (!bytes && unread.empty() && length.contains(path)) unread = bytes.error().message;
     return bytes.has_value();
 }
 
@@ -221,12 +225,49 @@ Expected<tinygltf::Model> parse(const Bytes& bytes, bool glb, ExternalFiles file
         for (tinygltf::Image& image : model.images) decodeUnknownType(image);
         return model;
     }
+    if (!files.unread.empty())
+        return fail(ErrorCode::BadInput,
+                    fmt::format("{}: a buffer's file cannot be read: {} Put it where the level says, "
+                                "or export the level as .glb.",
+                                file, files.unread));
     return fail(ErrorCode::BadInput, fmt::format("{}: is not a usable glTF file: {}. Export it again, or have a glTF "
                                                  "validator point out the place.",
                                                  file, message.empty() ? "unknown reason" : oneLine(message)));
 }
 
+// Neither glTF's text nor .glb: said before anything is made of its bytes.
+Expected<void> checkKind(const Bytes& bytes, const std::string& file) {
+    const auto begin = std::ranges::find_if_not(bytes, [](unsigned char c) { return std::isspace(c); });
+    const bool marked = bytes.size() >= 3 && bytes[0] == 0xef && bytes[1] == 0xbb && bytes[2] == 0xbf;  // as UTF-8
+    if (isGlb(bytes) || marked || (begin != bytes.end() && *begin == '{')) return {};
+    const bool is_pack = bytes.size() >= format::magic.size() &&
+                         std::memcmp(bytes.data(), format::magic.data(), format::magic.size()) == 0;
+    return fail(
+        ErrorCode::BadInput,
+        fmt::format("{}: is not a usable glTF file: {}", file,
+                    is_pack ? "it is a Dimmer pack. Give the level that it was cooked from; are arguments swapped?"
+                            : "it is neither JSON nor .glb. Export the level as glTF 2.0."));
+}
+
 }  // namespace
+
+std::vector<bool> animatedNodes(std::string_view gltf_json, size_t nodes) {
+    std::vector<bool> animated(nodes);
+    const auto json = nlohmann::json::parse(gltf_json, nullptr, false);
+    const auto listIn = [](const nlohmann::json& object, const char* name) {
+        const bool there = object.is_object() && object.contains(name) && object[name].is_array();
+        return there ? object[name] : nlohmann::json::array();
+    };
+    for (const auto& animation : listIn(json, "animations"))
+        for (const auto& channel : listIn(animation, "channels")) {
+            if (!channel.is_object() || !channel.contains("target") || !channel["target"].is_object()) continue;
+            const auto& target = channel["target"];
+            if (!target.contains("node") || !target["node"].is_number_unsigned()) continue;
+            if (target.contains("path") && target["path"] == "weights") continue;
+            if (const auto node = target["node"].get<size_t>(); node < nodes) animated[node] = true;
+        }
+    return animated;
+}
 
 Expected<Bytes> readFile(const std::filesystem::path& path) {
     std::error_code problem;
@@ -250,18 +291,13 @@ Expected<Bytes> readFile(const std::filesystem::path& path) {
     return bytes;
 }
 
-Expected<tinygltf::Model> readGltf(const std::filesystem::path& path) {
-    auto source = readGltfSource(path);
-    if (!source) return std::unexpected(source.error());
-    return std::move(source->model);
-}
-
 Expected<GltfSource> readGltfSource(const std::filesystem::path& path) {
     const std::string file = path.string();
     Expected<Bytes> bytes = readFile(path);
     if (!bytes) return std::unexpected(bytes.error());
     if (bytes->empty()) return fail(ErrorCode::BadInput, fmt::format("{}: is empty. Export the level again.", file));
 
+    if (auto ok = checkKind(*bytes, file); !ok) return std::unexpected(ok.error());
     const bool glb = isGlb(*bytes);
     std::string json(bytes->begin(), bytes->end());
     if (glb) {

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace dimmer::cook {
@@ -15,13 +16,13 @@ Expected<std::vector<unsigned char>> readFile(const std::filesystem::path& path)
 
 // Reads .glb or .gltf (told apart by content) with its buffers. Images stay encoded: bytes of external and data-URI
 // images in tinygltf::Image::image (empty when unreadable), others in their buffer view.
-Expected<tinygltf::Model> readGltf(const std::filesystem::path& path);
-
-// The same, with the JSON as it stands in the file: for writing it again without losing what the parser does not know.
 struct GltfSource {
-    std::string json;
+    std::string json;  // as it stands in the file, with what the parser does not know
     tinygltf::Model model;
 };
 Expected<GltfSource> readGltfSource(const std::filesystem::path& path);
+
+// Per node, whether an animation moves, turns or scales it. The model has no animations.
+std::vector<bool> animatedNodes(std::string_view gltf_json, size_t nodes);
 
 }  // namespace dimmer::cook

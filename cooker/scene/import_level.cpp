@@ -28,7 +28,11 @@ constexpr double texel_density_max = 256;  // per metre, as in profiles
 
 class LevelImporter {
    public:
-    LevelImporter(const tinygltf::Model& model, std::string file) : model_(model) { scene_.file = std::move(file); }
+    // `animated`: per node, whether an animation moves it.
+    LevelImporter(const tinygltf::Model& model, std::string file, std::vector<bool> animated)
+        : model_(model), animated_(std::move(animated)) {
+        scene_.file = std::move(file);
+    }
 
     Expected<Scene> run() {
         for (const auto step :
@@ -409,6 +413,7 @@ class LevelImporter {
         if (at.singular != -1) return singular(at, owner);
         if (!isInReach(at)) return context_.error(owner, farAway("is a place for what moves,"));
         scene_.dynamic_places.push_back({nodeName(at.node), at.world_from_node});
+        is_place_[static_cast<size_t>(at.node)] = true;
         return {};
     }
 
@@ -429,10 +434,39 @@ class LevelImporter {
         return importSky(context_, extras);
     }
 
+    // What seems to be meant to move, and is baked where it stands.
+    void warnOfWhatStandsStill() {
+        std::vector<int> parent(model_.nodes.size(), -1);
+        for (const PlacedNode& at : placed_) parent[static_cast<size_t>(at.node)] = at.parent;
+        int last = -1;
+        for (const SceneMesh& mesh : scene_.meshes) {
+            if (mesh.lighting == Lighting::Dynamic || mesh.door || mesh.gltf_node == last) continue;
+            last = mesh.gltf_node;
+            for (int node = last; node >= 0; node = parent[static_cast<size_t>(node)]) {
+                const auto i = static_cast<size_t>(node);
+                if (animated_[i])
+                    context_.warn(context_.nodeLabel(last),
+                                  "is animated, and is baked where it stands, with the shadow that it has there. "
+                                  "'dimmer_dynamic': 1 leaves it out and lights it as it moves; doors have "
+                                  "'dimmer_door'.");
+                else if (is_place_[i])
+                    context_.warn(
+                        context_.nodeLabel(last),
+                        fmt::format("is baked where it stands, though {} above it has 'dimmer_dynamic', which "
+                                    "reaches no meshes below. Set it at the mesh's node too.",
+                                    context_.nodeLabel(node)));
+                else
+                    continue;
+                break;
+            }
+        }
+    }
+
     Expected<void> conclude() {
         if (const auto ok = elements_.checkDoors(); !ok) return ok;
         if (const auto ok = checkOpenPoses(context_); !ok) return ok;
         leftovers_.warn(context_);
+        warnOfWhatStandsStill();
         Extras extras(context_);
         extras.add(sceneExtras(), "scene");
         if (const auto ok = elements_.combinations(extras); !ok) return ok;
@@ -446,6 +480,7 @@ class LevelImporter {
     }
 
     const tinygltf::Model& model_;
+    std::vector<bool> animated_, is_place_ = std::vector<bool>(animated_.size());  // per node
     Scene scene_;
     ImportContext context_{model_, scene_};
     Elements elements_{context_};
@@ -464,9 +499,10 @@ class LevelImporter {
 
 Expected<Scene> importLevel(const std::filesystem::path& path) {
     try {
-        const Expected<tinygltf::Model> model = readGltf(path);
-        if (!model) return std::unexpected(model.error());
-        return LevelImporter(*model, path.string()).run();
+        const Expected<GltfSource> source = readGltfSource(path);
+        if (!source) return std::unexpected(source.error());
+        const tinygltf::Model& model = source->model;
+        return LevelImporter(model, path.string(), animatedNodes(source->json, model.nodes.size())).run();
     } catch (const std::bad_alloc&) {
         return fail(ErrorCode::OutOfMemory, path.string() + ": needs more memory than there is. Split the level.");
     } catch (const std::length_error&) {

@@ -218,6 +218,12 @@ TEST_F(Cooks, WarnsOfWhatIsSuspicious) {
              l.node(lost)["translation"] = {0, -3, 0};
          },
          {"light set 'void' reaches no surface; it is kept, and does nothing"}},
+        {"a set whose lamps are at 0",
+         [](LevelFile& l) {
+             const int out = l.addLight("out", {{"type", "point"}, {"intensity", 0}}, {{"dimmer_light_set", "void"}});
+             l.node(out)["translation"] = {0, 2, 0};
+         },
+         {"light set 'void' has lights of intensity 0 alone; it is kept, and does nothing"}},
     };
     for (const Case& c : cases) {
         SCOPED_TRACE(c.name);

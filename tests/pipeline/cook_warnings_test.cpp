@@ -18,14 +18,17 @@ TEST(CoarseExposure, NamesTheSetThatAsksForIt) {
     Scene scene;
     scene.file = "level.glb";
     scene.light_sets = {{"hall", 1}, {"sun", 1e11f}};
-    EXPECT_FALSE(coarseExposure(scene, 0x1p-14f));  // 1 lux is the smallest that is stored well
-    EXPECT_FALSE(coarseExposure(scene, 64));
-    const auto warning = coarseExposure(scene, 0x1p-30f);
+    EXPECT_FALSE(coarseExposure(scene, 0x1p-14f, 2));  // 1 lux is the smallest that is stored well
+    EXPECT_FALSE(coarseExposure(scene, 64, 2));
+    const auto warning = coarseExposure(scene, 0x1p-30f, 2);
     ASSERT_TRUE(warning);
     EXPECT_THAT(*warning, testing::AllOf(HasSubstr("level.glb: "), HasSubstr("6.55e+04 lux"), HasSubstr("'sun'"),
                                          HasSubstr("1e+11")));
-    scene.light_sets.clear();
-    EXPECT_THAT(*coarseExposure(scene, 0x1p-30f), HasSubstr("intensity"));
+    const auto of_hall = coarseExposure(scene, 0x1p-30f, 1);  // it is the bright one, whatever others may be set to
+    ASSERT_TRUE(of_hall);
+    EXPECT_THAT(*of_hall, testing::AllOf(HasSubstr("'hall'"), HasSubstr("intensity"), testing::Not(HasSubstr("sun"))));
+    EXPECT_THAT(*coarseExposure(scene, 0x1p-30f, always_group),
+                testing::AllOf(HasSubstr("always on"), HasSubstr("intensity")));
 }
 
 TEST(WithoutLight, IsSaidOfLevelsThatStayBlack) {

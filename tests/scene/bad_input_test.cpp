@@ -39,6 +39,10 @@ TEST(SceneBadInput, DeepNestingDoesNotExhaustTheStack) {
     const std::string deep =
         R"({"asset": {"version": "2.0"}, "extras": )" + std::string(200000, '[') + std::string(200000, ']') + "}";
     expectBadInput(importBytes("level.gltf", bytesOf(deep)), {"nests"});
+    // What is no JSON nests nothing, however many brackets its bytes have.
+    const std::string brackets(200, '[');
+    expectBadInput(importBytes("level.gltf", bytesOf("DIMMER\r\n" + brackets)), {"Dimmer pack", "swapped"});
+    expectBadInput(importBytes("level.glb", bytesOf("BLENDER" + brackets)), {"neither JSON nor .glb"});
     // Brackets in texts do not nest.
     LevelFile level = LevelFile::withFloor();
     level.node(0)["extras"]["note"] = "\\\"" + std::string(1000, '[');

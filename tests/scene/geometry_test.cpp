@@ -257,6 +257,36 @@ TEST(SceneGeometry, AWarningOfManyNodesIsOneLine) {
     expectWarning(*scene, {"node 'crate0', node 'crate1', node 'crate2', node 'crate3' and 496 more: has no normals"});
 }
 
+// A rig as editors make it: the empty node moves, the mesh hangs below.
+TEST(SceneGeometry, WhatIsMeantToMoveAndIsBakedIsTold) {
+    for (const bool by_animation : {false, true})
+        for (const bool told : {false, true}) {
+            LevelFile level = LevelFile::withFloor();
+            const int mesh =
+                level.addMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, std::vector(3, glm::vec3(0, 0, 1)), {0, 1, 2}, 0);
+            json hull = {{"name", "hull"}, {"mesh", mesh}};
+            if (told) hull["extras"] = {{"dimmer_dynamic", 1}};
+            const int part = level.addNode(hull);
+            json& nodes = level.document["nodes"];
+            json& roots = level.document["scenes"][0]["nodes"];
+            roots.back() = nodes.size();
+            json drone = {{"name", "drone"}, {"children", {part}}};
+            if (by_animation)
+                level.document["animations"] = {
+                    {{"channels", {{{"sampler", 0}, {"target", {{"node", nodes.size()}, {"path", "translation"}}}}}},
+                     {"samplers", {{{"input", 0}, {"output", 0}}}}}};
+            else
+                drone["extras"] = {{"dimmer_dynamic", 1}};
+            nodes.push_back(drone);
+            const auto scene = level.import();
+            ASSERT_IMPORTED(scene);
+            ASSERT_EQ(scene->warnings.size(), told ? 0u : 1u) << by_animation;
+            if (!told)
+                expectWarning(*scene,
+                              {"node 'hull'", "baked where it stands", by_animation ? "animated" : "node 'drone'"});
+        }
+}
+
 TEST(SceneGeometry, FlatNormalsWhereThereAreNone) {
     LevelFile level = LevelFile::withFloor();
     // Two walls of a corner that share an edge.
