@@ -47,7 +47,7 @@ std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime
         KernelBinding::ofBuffer(model.buffer.get()), KernelBinding::ofBuffer(input.buffer.get()),
         KernelBinding::ofBuffer(output.buffer.get())};
     const Specialisation no_constants[] = {{}};
-    const Kernel kernel = valueOf(Kernel::create(vulkan, spirv::sample_grid_comp, bindings, 4, no_constants));
+    const Kernel kernel = valueOf(Kernel::create(vulkan, {spirv::sample_grid_comp}, bindings, 4, no_constants));
     auto transfer = valueOf(Transfer::create(vulkan, MemoryUse::Readback));
     const auto done = transfer.run([&](VkCommandBuffer commands) {
         kernel.bind(commands, 0);
