@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "dimmer/probe.glsl"
+#include "table.glsl"
 
 layout(local_size_x_id = 1) in;
 
@@ -18,21 +19,21 @@ layout(push_constant) uniform Dispatch {
 }
 dispatch;
 
-layout(set = 0, binding = 0) uniform utextureBuffer places;   // BatchPlace
-layout(set = 0, binding = 1) uniform utextureBuffer targets;  // the probe's number, per receiver
-layout(set = 0, binding = 2) uniform utextureBuffer records_16;  // base first, then contributions
-layout(set = 0, binding = 3) uniform utextureBuffer records_8;
-layout(set = 0, binding = 4) uniform utextureBuffer records_4;
-layout(set = 0, binding = 5) uniform utextureBuffer work;   // WorkItem
-layout(set = 0, binding = 6) uniform utextureBuffer terms;  // WorkTerm
+TABLE(0, uvec4, places)      // BatchPlace
+TABLE(1, uint, targets)      // the probe's number, per receiver
+TABLE(2, uvec4, records_16)  // base first, then contributions
+TABLE(3, uvec2, records_8)
+TABLE(4, uint, records_4)
+TABLE(5, uvec4, work)        // WorkItem
+TABLE(6, uvec4, terms)       // WorkTerm
 layout(set = 0, binding = 7, std430) writeonly buffer Probes { uint probes[]; };  // 7 words each
 
 const uint lanes_per_item = 16u;
 
 DimmerProbe load_record(uint index) {
-    uvec4 a = texelFetch(records_16, int(index));
-    uvec2 b = texelFetch(records_8, int(index)).xy;
-    return DimmerProbe(a.x, uint[6](a.y, a.z, a.w, b.x, b.y, texelFetch(records_4, int(index)).x));
+    uvec4 a = FETCH(records_16, index);
+    uvec2 b = FETCH(records_8, index).xy;
+    return DimmerProbe(a.x, uint[6](a.y, a.z, a.w, b.x, b.y, FETCH(records_4, index).x));
 }
 
 void store_probe(uint number, DimmerProbe probe) {
@@ -44,8 +45,8 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     uint index = group * (gl_WorkGroupSize.x / lanes_per_item) + gl_LocalInvocationIndex / lanes_per_item;
     if (index >= dispatch.item_count) return;
-    uvec4 item = texelFetch(work, int(dispatch.first_item + index));
-    uvec4 place = texelFetch(places, int(item.x));
+    uvec4 item = FETCH(work, dispatch.first_item + index);
+    uvec4 place = FETCH(places, item.x);
     for (uint i = gl_LocalInvocationIndex % lanes_per_item; i < place.y; i += lanes_per_item) {
         DimmerProbe probe = load_record(place.x + i);
         if (terms_on != 0) {
@@ -53,11 +54,11 @@ void main() {
             dimmer_probe_add(sum, probe, vec3(dimmer_weight_scale(color_format)), color_format);
             uint count = terms_on < 0 || terms_on > 8 ? item.z : uint(terms_on);
             for (uint t = 0u; t < count; ++t) {
-                uvec4 term = texelFetch(terms, int(item.y + t));
+                uvec4 term = FETCH(terms, item.y + t);
                 dimmer_probe_add(sum, load_record(term.x + place.z + i), uintBitsToFloat(term.yzw), color_format);
             }
             probe = dimmer_probe_encode(sum, color_format);
         }
-        store_probe(texelFetch(targets, int(place.x + i)).x, probe);
+        store_probe(FETCH(targets, place.x + i).x, probe);
     }
 }

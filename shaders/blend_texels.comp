@@ -7,6 +7,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "dimmer/texel.glsl"
+#include "table.glsl"
 
 layout(local_size_x_id = 1) in;
 
@@ -22,14 +23,14 @@ layout(push_constant) uniform Dispatch {
 }
 dispatch;
 
-// Texel buffers, as lavapipe loads 16 bytes from one several times faster than from a storage buffer.
-layout(set = 0, binding = 0) uniform utextureBuffer places;     // two receivers an element, a byte each: BatchTiles::add;
-                                                                // batches that lie alike share theirs
-layout(set = 0, binding = 1) uniform utextureBuffer base;       // two records an element
-layout(set = 0, binding = 2) uniform utextureBuffer payload;    // two records an element
-layout(set = 0, binding = 3) uniform utextureBuffer work;       // TexelItem
-layout(set = 0, binding = 4) uniform utextureBuffer terms;      // WorkTerm
-layout(set = 0, binding = 5) uniform utextureBuffer batches;    // TexelBatch
+// lavapipe loads 16 bytes from a texel buffer several times faster than from a storage buffer.
+TABLE(0, uint, places)    // two receivers an element, a byte each: BatchTiles::add;
+                          // batches that lie alike share theirs
+TABLE(1, uvec4, base)     // two records an element
+TABLE(2, uvec4, payload)  // two records an element
+TABLE(3, uvec2, work)     // TexelItem
+TABLE(4, uvec4, terms)    // WorkTerm
+TABLE(5, uvec4, batches)  // TexelBatch
 layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray irradiance_pages;
 layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2DArray direction_pages;
 
@@ -50,9 +51,9 @@ struct Item {
 };
 
 Item load_item(uint index) {
-    uvec2 work_item = texelFetch(work, int(index)).xy;
+    uvec2 work_item = FETCH(work, index).xy;
     const uint low_26 = 0x3ffffffu, low_27 = 0x7ffffffu, low_18 = 0x3ffffu;
-    uvec4 batch = texelFetch(batches, int(work_item.x & low_26));
+    uvec4 batch = FETCH(batches, work_item.x & low_26);
     uint tile_1 = batch.w & low_18, tile_2 = tile_1 + (batch.w >> 18 & 0xfffu);
     uint tile_3 = tile_2 + (batch.x >> 27 | batch.y >> 27 << 5 | batch.w >> 30 << 10);
     return Item(work_item.y & low_26, work_item.x >> 26 | work_item.y >> 26 << 6, (batch.x & low_27) << 1,
@@ -62,12 +63,12 @@ Item load_item(uint index) {
 
 // The pair of records `offset` receivers into the item.
 uvec4 load_pair(uint first_record, uint offset) {
-    return texelFetch(payload, int((first_record + offset) >> 1));
+    return FETCH(payload, (first_record + offset) >> 1);
 }
 
 // The item's first record of a term, and its weight.
 uvec4 locate(Item item, uint index) {
-    uvec4 term = texelFetch(terms, int(item.first_term + index));
+    uvec4 term = FETCH(terms, item.first_term + index);
     return uvec4(term.x + item.first_receiver, term.yzw);
 }
 
@@ -81,7 +82,7 @@ uvec4 load_term(Item item, uint t) {
 
 // Both texels of a pair with `terms_on` terms; all is loaded before it is used, one texel's sums live at a time.
 uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
-    uvec4 base_pair = texelFetch(base, int((item.first_receiver + offset) >> 1));
+    uvec4 base_pair = FETCH(base, (item.first_receiver + offset) >> 1);
     if (terms_on == 0) return base_pair;
     uvec4 pair[specialised_max];
     for (int t = 0; t < terms_on; ++t) pair[t] = load_pair(term[t].x, offset);
@@ -99,7 +100,7 @@ uvec4 blend_pair(Item item, uint offset, uvec4 term[specialised_max]) {
 
 // The same for any number of terms, in blocks within which the sums stay in registers; padded like load_term.
 uvec4 blend_pair_loop(Item item, uint offset) {
-    uvec4 base_pair = texelFetch(base, int((item.first_receiver + offset) >> 1));
+    uvec4 base_pair = FETCH(base, (item.first_receiver + offset) >> 1);
     DimmerTexelBlend first = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
     DimmerTexelBlend second = first;
     dimmer_blend_add(first, base_pair.x, base_pair.y, vec3(dimmer_weight_scale(color_format)), color_format);
@@ -132,7 +133,7 @@ void store(ivec3 texel, uvec2 record) {
 }
 
 void store_pair(Item item, uint offset, uvec4 records) {
-    uvec2 place = texelFetch(places, int(item.first_places + (offset >> 1))).xy;
+    uvec2 place = FETCH_BYTES(places, item.first_places + (offset >> 1));
     store(texel_of(item, place.x), records.xy);
     store(offset + 1u < item.receiver_count ? texel_of(item, place.y) : nowhere, records.zw);
 }

@@ -1,5 +1,8 @@
 // The roof for updates: loads and stores as many bytes as they do, and computes nothing. See gpu/copy_roof.h.
 #version 450
+#extension GL_GOOGLE_include_directive : require
+
+#include "table.glsl"
 
 layout(local_size_x_id = 0) in;
 layout(constant_id = 1) const int loads = 3;        // of 16 bytes, per 16 bytes stored
@@ -14,7 +17,7 @@ layout(push_constant) uniform Copy {
 }
 copy;
 
-layout(set = 0, binding = 0) uniform utextureBuffer source;
+TABLE(0, uvec4, source)
 layout(set = 0, binding = 1, std430) writeonly buffer Target { uvec4 target[]; };
 layout(set = 0, binding = 2, r32ui) writeonly uniform uimage2DArray pages_0;
 layout(set = 0, binding = 3, r32ui) writeonly uniform uimage2DArray pages_1;
@@ -43,7 +46,7 @@ void main() {
         uvec4 value = uvec4(0);
         uint begin_load = one_stream ? (copy.first + unit) * uint(loads) : copy.first + unit;
         uint step = one_stream ? 1u : copy.stride;
-        for (int s = 0; s < loads; ++s) value ^= texelFetch(source, int(begin_load + uint(s) * step));
+        for (int s = 0; s < loads; ++s) value ^= FETCH(source, begin_load + uint(s) * step);
         store(copy.first + unit, value);
     }
 }

@@ -3,6 +3,8 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
 
+#include "table.glsl"
+
 layout(local_size_x = 64) in;
 
 layout(constant_id = 0) const uint color_format = 0u;  // ColorFormat
@@ -13,7 +15,7 @@ layout(push_constant) uniform Dispatch {
 }
 dispatch;
 
-layout(set = 0, binding = 0) uniform utextureBuffer items;  // ResampleItem, four elements each
+TABLE(0, uvec4, items)  // ResampleItem, four elements each
 layout(set = 0, binding = 1, std430) readonly buffer Grid { uvec4 grid_table[]; };
 layout(set = 0, binding = 2, std430) buffer Probes { uint probes[]; };
 layout(set = 0, binding = 3, std430) buffer Hints { uint hints[]; };  // per moving probe
@@ -38,8 +40,8 @@ DimmerProbe resample(vec3 point, inout uint tetrahedron) {
 void main() {
     uint index = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (index >= dispatch.item_count) return;
-    uvec4 origin = texelFetch(items, int(4u * index)), step_x = texelFetch(items, int(4u * index + 1u));
-    uvec4 step_y = texelFetch(items, int(4u * index + 2u)), step_z = texelFetch(items, int(4u * index + 3u));
+    uvec4 origin = FETCH(items, 4u * index), step_x = FETCH(items, 4u * index + 1u);
+    uvec4 step_y = FETCH(items, 4u * index + 2u), step_z = FETCH(items, 4u * index + 3u);
     if (gl_LocalInvocationIndex >= step_z.w) return;
     uint i = step_y.w + gl_LocalInvocationIndex;
     uvec3 counts = uvec3(step_x.w & 0xffu, step_x.w >> 8 & 0xffu, step_x.w >> 16);

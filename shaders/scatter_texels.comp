@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 
 #include "dimmer/texel.glsl"
+#include "table.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -24,10 +25,10 @@ struct Scratch {
     float r, g, b, l, d0, d1, d2, terms;
 };
 
-layout(set = 0, binding = 0) uniform utextureBuffer addresses;  // TexelAddress
-layout(set = 0, binding = 1) uniform utextureBuffer base;
-layout(set = 0, binding = 2) uniform utextureBuffer payload;
-layout(set = 0, binding = 3) uniform utextureBuffer receivers;  // of each record
+TABLE(0, uint, addresses)  // TexelAddress
+TABLE(1, uvec2, base)
+TABLE(2, uvec2, payload)
+TABLE(3, uint, receivers)  // of each record
 layout(set = 0, binding = 4, std430) buffer Sums { Scratch sums[]; };
 layout(set = 0, binding = 5, r32ui) writeonly uniform uimage2DArray irradiance_pages;
 layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2DArray direction_pages;
@@ -46,20 +47,20 @@ void main() {
     uint index = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * 64u + gl_LocalInvocationIndex;
     if (index >= dispatch.count) return;
     if (pass == 0) {
-        uvec2 record = texelFetch(base, int(index)).xy;
+        uvec2 record = FETCH(base, index).xy;
         DimmerTexelBlend sum = DimmerTexelBlend(vec3(0), 0.0, vec3(0));
         dimmer_blend_add(sum, record.x, record.y, vec3(dimmer_weight_scale(color_format)), color_format);
         save(index, sum, 0.0);
     } else if (pass == 1) {
         uint record_index = dispatch.first_record + index;
-        uint receiver = texelFetch(receivers, int(record_index)).x;
-        uvec2 record = texelFetch(payload, int(record_index)).xy;
+        uint receiver = FETCH(receivers, record_index).x;
+        uvec2 record = FETCH(payload, record_index).xy;
         DimmerTexelBlend sum = load(receiver);
         dimmer_blend_add(sum, record.x, record.y, vec3(dispatch.weight_r, dispatch.weight_g, dispatch.weight_b), color_format);
         save(receiver, sum, 1.0);
     } else {
-        uvec2 record = sums[index].terms > 0.0 ? dimmer_blend_encode(load(index), color_format) : texelFetch(base, int(index)).xy;
-        uint address = texelFetch(addresses, int(index)).x;
+        uvec2 record = sums[index].terms > 0.0 ? dimmer_blend_encode(load(index), color_format) : FETCH(base, index).xy;
+        uint address = FETCH(addresses, index).x;
         ivec3 texel = ivec3(address & 0xfffu, address >> 12 & 0xfffu, address >> 24);
         imageStore(irradiance_pages, texel, uvec4(record.x));
         imageStore(direction_pages, texel, uvec4(record.y));

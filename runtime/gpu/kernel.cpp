@@ -33,6 +33,29 @@ VkDeviceSize texelBytes(VkFormat format) {
     }
 }
 
+Expected<void> checkTable(const VkPhysicalDeviceLimits& limits, VkDeviceSize size_bytes) {
+    if (size_bytes <= limits.maxStorageBufferRange) return {};
+    return fail(ErrorCode::Unsupported,
+                fmt::format("A table of {} bytes exceeds what this Vulkan device reads as one buffer, {} texels "
+                            "(maxTexelBufferElements) or {} bytes (maxStorageBufferRange). Cook with fewer texels per "
+                            "metre, wider grids or a higher activity threshold, or create the runtime with a smaller "
+                            "moving_probes_max.",
+                            size_bytes, limits.maxTexelBufferElements, limits.maxStorageBufferRange));
+}
+
+// Of one set, in which tables are storage buffers.
+Expected<void> checkStorageTables(const VulkanContext& vulkan, std::span<const KernelBinding> bindings) {
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
+    for (const KernelBinding& binding : bindings) DIMMER_TRY(checkTable(limits, binding.table_bytes));
+    const auto buffers = std::ranges::count(bindings, KernelBinding::Kind::StorageBuffer, &KernelBinding::kind);
+    if (buffers <= limits.maxPerStageDescriptorStorageBuffers) return {};
+    return fail(ErrorCode::Unsupported,
+                fmt::format("The pack's tables have more than the {} texels that this Vulkan device reads as one "
+                            "texel buffer; read otherwise they take {} storage buffers in a shader, and the device "
+                            "binds {} (maxPerStageDescriptorStorageBuffers).",
+                            limits.maxTexelBufferElements, buffers, limits.maxPerStageDescriptorStorageBuffers));
+}
+
 Expected<ShaderModuleHandle> createModule(VkDevice device, std::span<const uint32_t> spirv) {
     auto info = vkStruct<VkShaderModuleCreateInfo>(VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO);
     info.codeSize = spirv.size_bytes();
@@ -44,13 +67,23 @@ Expected<ShaderModuleHandle> createModule(VkDevice device, std::span<const uint3
 
 }  // namespace
 
-Expected<Kernel> Kernel::create(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
+Expected<Kernel> Kernel::create(const VulkanContext& vulkan, const KernelCode& code,
                                 std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
                                 std::span<const Specialisation> pipelines, uint32_t set_count) {
+    std::vector<KernelBinding> bound(bindings.begin(), bindings.end());
+    const bool by_storage = std::ranges::any_of(bound, [](const KernelBinding& binding) {
+        return binding.kind == KernelBinding::Kind::TexelBuffer && !binding.texels;
+    });
+    if (by_storage) {
+        for (KernelBinding& binding : bound)
+            if (binding.kind == KernelBinding::Kind::TexelBuffer) binding.kind = KernelBinding::Kind::StorageBuffer;
+        DIMMER_TRY(checkStorageTables(vulkan, std::span(bound).first(bound.size() / set_count)));
+    }
     Kernel kernel;
-    DIMMER_TRY(kernel.createLayouts(vulkan.device, bindings.first(bindings.size() / set_count), push_constant_bytes));
-    DIMMER_TRY(kernel.createDescriptors(vulkan.device, bindings, set_count));
-    DIMMER_TRY(kernel.createPipelines(vulkan, spirv, pipelines));
+    DIMMER_TRY(
+        kernel.createLayouts(vulkan.device, std::span(bound).first(bound.size() / set_count), push_constant_bytes));
+    DIMMER_TRY(kernel.createDescriptors(vulkan.device, bound, set_count));
+    DIMMER_TRY(kernel.createPipelines(vulkan, by_storage ? code.storage_tables : code.texel_tables, pipelines));
     return kernel;
 }
 
@@ -162,23 +195,19 @@ void Kernel::bind(VkCommandBuffer commands, size_t pipeline, uint32_t set) const
     vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipelines_[pipeline].get());
 }
 
-Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
-                                        MemoryUse use) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    const VkDeviceSize texels = size_bytes / texelBytes(format);
-    if (texels > properties.limits.maxTexelBufferElements)
-        return fail(
-            ErrorCode::Unsupported,
-            fmt::format("A table of {} texels exceeds what this Vulkan device reads as one buffer, {}. Cook with "
-                        "fewer texels per metre, wider grids or a higher activity threshold, or create the "
-                        "runtime with a smaller moving_probes_max.",
-                        texels, properties.limits.maxTexelBufferElements));
-    TexelBuffer result;
+Expected<GpuTable> createTable(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format, MemoryUse use) {
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
+    const bool as_texels = size_bytes / texelBytes(format) <= limits.maxTexelBufferElements;
+    if (!as_texels) DIMMER_TRY(checkTable(limits, size_bytes));
+    GpuTable result;
+    // Of a kernel's tables, those that would do as texels become storage buffers with the one that does not.
     auto buffer = createBuffer(vulkan, std::max<VkDeviceSize>(size_bytes, texel_buffer_bytes_min),
-                               VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, use);
+                               VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT |
+                                   VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                               use);
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     result.buffer = std::move(*buffer);
+    if (!as_texels) return result;
     auto info = vkStruct<VkBufferViewCreateInfo>(VK_STRUCTURE_TYPE_BUFFER_VIEW_CREATE_INFO);
     info.buffer = result.buffer.buffer.get();
     info.format = format;

@@ -8,6 +8,21 @@
 
 namespace dimmer {
 
+// A buffer that kernels read by the number of an element, and the view through which they read it as texels: null where
+// it has more elements than the device reads so.
+struct GpuTable {
+    GpuBuffer buffer;
+    BufferViewHandle view;
+};
+// Of at least one element: what nothing reads still needs something to bind. Unsupported where the device reads so many
+// neither as a texel buffer nor as a storage buffer.
+Expected<GpuTable> createTable(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format, MemoryUse use);
+
+// A kernel's SPIR-V, by how it reads its tables (shaders/table.glsl).
+struct KernelCode {
+    std::span<const uint32_t> texel_tables, storage_tables = {};
+};
+
 // What a shader's binding refers to; its number is its place in the list.
 struct KernelBinding {
     enum class Kind { TexelBuffer, StorageBuffer, StorageImage };
@@ -15,8 +30,12 @@ struct KernelBinding {
     VkBufferView texels = VK_NULL_HANDLE;
     VkBuffer buffer = VK_NULL_HANDLE;
     VkImageView image = VK_NULL_HANDLE;  // in VK_IMAGE_LAYOUT_GENERAL while the kernel runs
+    VkDeviceSize table_bytes = 0;
 
-    static KernelBinding ofTexels(VkBufferView view) { return {.kind = Kind::TexelBuffer, .texels = view}; }
+    static KernelBinding ofTable(const GpuTable& table) {
+        return {
+            .texels = table.view.get(), .buffer = table.buffer.buffer.get(), .table_bytes = table.buffer.size_bytes};
+    }
     static KernelBinding ofBuffer(VkBuffer buffer) { return {.kind = Kind::StorageBuffer, .buffer = buffer}; }
     static KernelBinding ofImage(VkImageView view) { return {.kind = Kind::StorageImage, .image = view}; }
 };
@@ -26,8 +45,9 @@ using Specialisation = std::vector<uint32_t>;
 
 class Kernel {
    public:
-    // `bindings`: one list after another of as many, where there are several sets to choose from.
-    static Expected<Kernel> create(const VulkanContext& vulkan, std::span<const uint32_t> spirv,
+    // `bindings`: one list after another of as many, where there are several sets to choose from. Where a table has no
+    // view, all are bound as storage buffers; Unsupported where the device does not bind so large or so many.
+    static Expected<Kernel> create(const VulkanContext& vulkan, const KernelCode& code,
                                    std::span<const KernelBinding> bindings, uint32_t push_constant_bytes,
                                    std::span<const Specialisation> pipelines, uint32_t set_count = 1);
 
@@ -53,15 +73,5 @@ class Kernel {
     std::vector<VkDescriptorSet> descriptors_;
     std::vector<PipelineHandle> pipelines_;
 };
-
-// A buffer and the view through which shaders read it as texels.
-struct TexelBuffer {
-    GpuBuffer buffer;
-    BufferViewHandle view;
-};
-// Of at least one texel: what nothing reads still needs a view to bind. Unsupported where they are more than the device
-// reads as one buffer.
-Expected<TexelBuffer> createTexelBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkFormat format,
-                                        MemoryUse use);
 
 }  // namespace dimmer

@@ -4,18 +4,12 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 
+#include <algorithm>
 #include <array>
-#include <optional>
+#include <vector>
 
 namespace dimmer {
 namespace {
-
-std::optional<uint32_t> findMemoryType(const VkPhysicalDeviceMemoryProperties& properties, uint32_t allowed_types,
-                                       VkMemoryPropertyFlags flags) {
-    for (uint32_t i = 0; i < properties.memoryTypeCount; ++i)
-        if ((allowed_types >> i & 1) && (properties.memoryTypes[i].propertyFlags & flags) == flags) return i;
-    return std::nullopt;
-}
 
 // What is best first, then what will do.
 std::array<VkMemoryPropertyFlags, 2> wanted(MemoryUse use) {
@@ -31,6 +25,18 @@ std::array<VkMemoryPropertyFlags, 2> wanted(MemoryUse use) {
     return {host, host};
 }
 
+// Those that will do, the best first.
+std::vector<uint32_t> memoryTypes(const VkPhysicalDeviceMemoryProperties& properties, uint32_t allowed_types,
+                                  MemoryUse use) {
+    std::vector<uint32_t> types;
+    for (const VkMemoryPropertyFlags flags : wanted(use))
+        for (uint32_t i = 0; i < properties.memoryTypeCount; ++i)
+            if ((allowed_types >> i & 1) && (properties.memoryTypes[i].propertyFlags & flags) == flags &&
+                std::ranges::find(types, i) == types.end())
+                types.push_back(i);
+    return types;
+}
+
 Expected<MemoryHandle> allocate(const VulkanContext& vulkan, const VkMemoryRequirements& requirements, MemoryUse use) {
     const VkDeviceSize bytes_max = allocationBytesMax(vulkan.physical_device);
     if (requirements.size > bytes_max)
@@ -41,16 +47,21 @@ Expected<MemoryHandle> allocate(const VulkanContext& vulkan, const VkMemoryRequi
                                 requirements.size, bytes_max));
     VkPhysicalDeviceMemoryProperties properties;
     vkGetPhysicalDeviceMemoryProperties(vulkan.physical_device, &properties);
-    std::optional<uint32_t> type;
-    for (VkMemoryPropertyFlags flags : wanted(use))
-        if (!type) type = findMemoryType(properties, requirements.memoryTypeBits, flags);
-    if (!type) return fail(ErrorCode::Unsupported, "The Vulkan device has no memory type of the kind that is needed.");
+    const std::vector<uint32_t> types = memoryTypes(properties, requirements.memoryTypeBits, use);
+    if (types.empty())
+        return fail(ErrorCode::Unsupported, "The Vulkan device has no memory type of the kind that is needed.");
 
     auto info = vkStruct<VkMemoryAllocateInfo>(VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO);
     info.allocationSize = requirements.size;
-    info.memoryTypeIndex = *type;
     VkDeviceMemory memory = VK_NULL_HANDLE;
-    DIMMER_VK(vkAllocateMemory, vulkan.device, &info, nullptr, &memory);
+    VkResult result = VK_ERROR_OUT_OF_DEVICE_MEMORY;
+    for (const uint32_t type : types) {
+        info.memoryTypeIndex = type;
+        result = vkAllocateMemory(vulkan.device, &info, nullptr, &memory);
+        // A small heap of the device's may be full, and its types come first.
+        if (result != VK_ERROR_OUT_OF_DEVICE_MEMORY || use != MemoryUse::Device) break;
+    }
+    if (result < 0) return vulkanError(result, "vkAllocateMemory");
     return MemoryHandle(vulkan.device, memory);
 }
 
@@ -65,6 +76,12 @@ void share(const VulkanContext& vulkan, std::array<uint32_t, 2>& families, Info&
 }
 
 }  // namespace
+
+VkPhysicalDeviceLimits limitsOf(const VulkanContext& vulkan) {
+    VkPhysicalDeviceProperties properties;
+    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    return properties.limits;
+}
 
 VkDeviceSize allocationBytesMax(VkPhysicalDevice device) {
     auto allocations =

@@ -27,11 +27,14 @@ enum class MemoryUse {
     Readback,  // written by the GPU, read by the host
 };
 
+VkPhysicalDeviceLimits limitsOf(const VulkanContext& vulkan);
+
 // What the device allocates at a time. 0: its instance is for a Vulkan before 1.1, where nobody says.
 VkDeviceSize allocationBytesMax(VkPhysicalDevice device);
 
-// Both may be used on the context's queue and on its compute queue. Unsupported: larger than the device allocates at a
-// time.
+// In the best type of memory for its use; where that is full, what the device alone uses goes to the next best, whose
+// heap may be the host's. Both may be used on the context's queue and on its compute queue. Unsupported: larger than
+// the device allocates at a time.
 Expected<GpuBuffer> createBuffer(const VulkanContext& vulkan, VkDeviceSize size_bytes, VkBufferUsageFlags usage,
                                  MemoryUse memory);
 Expected<GpuImage> createImage(const VulkanContext& vulkan, VkImageCreateInfo info);

@@ -5,7 +5,9 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 #include <spirv/gather_texels_comp.h>
+#include <spirv/gather_texels_comp_storage.h>
 #include <spirv/scatter_texels_comp.h>
+#include <spirv/scatter_texels_comp_storage.h>
 
 #include <cstring>
 
@@ -14,12 +16,6 @@ namespace {
 
 constexpr VkFormat word_format = VK_FORMAT_R32_UINT, record_format = VK_FORMAT_R32G32_UINT,
                    index_format = VK_FORMAT_R16_UINT;
-
-VkPhysicalDeviceLimits limitsOf(const VulkanContext& vulkan) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    return properties.limits;
-}
 
 std::vector<TexelRecord> baseRecords(const PackData& data) {
     std::vector<TexelRecord> records;
@@ -74,22 +70,22 @@ Expected<GatherBlender> GatherBlender::create(const VulkanContext& vulkan, const
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, records, record_format), blender.payload_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, contributions, index_format), blender.contributions_));
     DIMMER_TRY(keep(uploadTable(vulkan, transfer, first_record, word_format), blender.first_record_));
-    DIMMER_TRY(
-        keep(createTexelBuffer(vulkan, data.contributions.size() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-             blender.weights_));
+    DIMMER_TRY(keep(createTable(vulkan, data.contributions.size() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
+                    blender.weights_));
     const KernelBinding bindings[] = {
-        KernelBinding::ofTexels(blender.addresses_.view.get()),
-        KernelBinding::ofTexels(blender.base_.view.get()),
-        KernelBinding::ofTexels(blender.payload_.view.get()),
-        KernelBinding::ofTexels(blender.contributions_.view.get()),
-        KernelBinding::ofTexels(blender.first_record_.view.get()),
-        KernelBinding::ofTexels(blender.weights_.view.get()),
+        KernelBinding::ofTable(blender.addresses_),
+        KernelBinding::ofTable(blender.base_),
+        KernelBinding::ofTable(blender.payload_),
+        KernelBinding::ofTable(blender.contributions_),
+        KernelBinding::ofTable(blender.first_record_),
+        KernelBinding::ofTable(blender.weights_),
         KernelBinding::ofImage(pages.irradianceStorageView()),
         KernelBinding::ofImage(pages.directionStorageView()),
     };
     const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
     blender.weight_scale_ = weightScale(data.color_format);
-    auto kernel = Kernel::create(vulkan, spirv::gather_texels_comp, bindings, sizeof(uint32_t), pipelines);
+    auto kernel = Kernel::create(vulkan, {spirv::gather_texels_comp, spirv::gather_texels_comp_storage}, bindings,
+                                 sizeof(uint32_t), pipelines);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
     return blender;
@@ -145,10 +141,10 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     if (!sums) return std::unexpected(std::move(sums.error()));
     blender.sums_ = std::move(*sums);
     const KernelBinding bindings[] = {
-        KernelBinding::ofTexels(blender.addresses_.view.get()),
-        KernelBinding::ofTexels(blender.base_.view.get()),
-        KernelBinding::ofTexels(blender.payload_.view.get()),
-        KernelBinding::ofTexels(blender.receivers_of_records_.view.get()),
+        KernelBinding::ofTable(blender.addresses_),
+        KernelBinding::ofTable(blender.base_),
+        KernelBinding::ofTable(blender.payload_),
+        KernelBinding::ofTable(blender.receivers_of_records_),
         KernelBinding::ofBuffer(blender.sums_.buffer.get()),
         KernelBinding::ofImage(pages.irradianceStorageView()),
         KernelBinding::ofImage(pages.directionStorageView()),
@@ -156,7 +152,8 @@ Expected<ScatterBlender> ScatterBlender::create(const VulkanContext& vulkan, con
     const auto format = static_cast<uint32_t>(data.color_format);
     blender.weight_scale_ = weightScale(data.color_format);
     const Specialisation passes[] = {{0, format}, {1, format}, {2, format}};
-    auto kernel = Kernel::create(vulkan, spirv::scatter_texels_comp, bindings, 5 * sizeof(uint32_t), passes);
+    auto kernel = Kernel::create(vulkan, {spirv::scatter_texels_comp, spirv::scatter_texels_comp_storage}, bindings,
+                                 5 * sizeof(uint32_t), passes);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     blender.kernel_ = std::move(*kernel);
     return blender;

@@ -18,7 +18,7 @@ class GatherBlender : public TexelExecutor {
     uint32_t pipelineCount() const override { return kernel_.pipelineCount(); }
 
    private:
-    TexelBuffer addresses_, base_, payload_, contributions_, first_record_, weights_;
+    GpuTable addresses_, base_, payload_, contributions_, first_record_, weights_;
     Kernel kernel_;
     uint32_t receivers_ = 0, groups_x_max_ = 0;
     float weight_scale_ = 1;
@@ -38,7 +38,7 @@ class ScatterBlender : public TexelExecutor {
     struct Part {
         uint32_t first_record, count;
     };
-    TexelBuffer addresses_, base_, payload_, receivers_of_records_;
+    GpuTable addresses_, base_, payload_, receivers_of_records_;
     GpuBuffer sums_;
     Kernel kernel_;
     std::vector<Part> parts_;  // per contribution

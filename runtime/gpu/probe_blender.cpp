@@ -1,10 +1,10 @@
 #include <gpu/probe_blender.h>
 
-#include <fmt/format.h>
 #include <format/probe.h>
 #include <gpu/table_upload.h>
 #include <gpu/vk_result.h>
 #include <spirv/blend_probes_comp.h>
+#include <spirv/blend_probes_comp_storage.h>
 
 #include <cstring>
 
@@ -22,8 +22,8 @@ ProbeRecord recordAt(const PackData& data, uint32_t i) {
 
 // `count` words of each record, from `first` on, as a stream of their own.
 template <size_t first, size_t count>
-Expected<TexelBuffer> uploadStream(const VulkanContext& vulkan, Transfer& transfer, const PackData& data,
-                                   VkFormat format) {
+Expected<GpuTable> uploadStream(const VulkanContext& vulkan, Transfer& transfer, const PackData& data,
+                                VkFormat format) {
     const std::vector<Run> all = {
         {0, 0, static_cast<uint32_t>(data.probes.numbers.size() + data.probes.payload.size())}};
     using Words = std::array<uint32_t, count>;
@@ -35,27 +35,13 @@ Expected<TexelBuffer> uploadStream(const VulkanContext& vulkan, Transfer& transf
                        }));
 }
 
-Expected<void> checkLimits(const VulkanContext& vulkan, const ProbeData& probes) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    const uint64_t records = probes.numbers.size() + probes.payload.size();
-    if (records <= properties.limits.maxTexelBufferElements) return {};
-    return fail(ErrorCode::Unsupported,
-                fmt::format("The pack's {} light probes with {} records exceed what this Vulkan device reads as one "
-                            "buffer. Cook with wider grids or a higher activity threshold.",
-                            probes.base.size(), records));
-}
-
 }  // namespace
 
 Expected<ProbeBlender> ProbeBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             const ProbeAtlas& atlas, uint32_t lists, Transfer& transfer) {
-    DIMMER_TRY(checkLimits(vulkan, data.probes));
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
     ProbeBlender blender;
     blender.data_ = &data.probes;
-    blender.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    blender.groups_x_max_ = limitsOf(vulkan).maxComputeWorkGroupCount[0];
     DIMMER_TRY(blender.createTables(vulkan, data, transfer));
     for (uint32_t i = 0; i < lists; ++i) DIMMER_TRY(blender.createWork(vulkan, planner));
     DIMMER_TRY(blender.createKernel(vulkan, data.color_format, planner, atlas));
@@ -79,10 +65,10 @@ Expected<void> ProbeBlender::createTables(const VulkanContext& vulkan, const Pac
 
 Expected<void> ProbeBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
     Work work;
-    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload),
-                    work.items));
-    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-                    work.terms));
+    DIMMER_TRY(
+        keep(createTable(vulkan, planner.itemsMax() * sizeof(WorkItem), wide_format, MemoryUse::Upload), work.items));
+    DIMMER_TRY(
+        keep(createTable(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload), work.terms));
     work_.push_back(std::move(work));
     return {};
 }
@@ -96,13 +82,14 @@ Expected<void> ProbeBlender::createKernel(const VulkanContext& vulkan, ColorForm
     std::vector<KernelBinding> bindings;
     for (uint32_t set = 0; set < atlas.setCount(); ++set)
         for (const Work& work : work_) {
-            const TexelBuffer* const tables[] = {&places_,    &numbers_,   &records_16_, &records_8_,
-                                                 &records_4_, &work.items, &work.terms};
-            for (const TexelBuffer* table : tables) bindings.push_back(KernelBinding::ofTexels(table->view.get()));
+            const GpuTable* const tables[] = {&places_,    &numbers_,   &records_16_, &records_8_,
+                                              &records_4_, &work.items, &work.terms};
+            for (const GpuTable* table : tables) bindings.push_back(KernelBinding::ofTable(*table));
             bindings.push_back(KernelBinding::ofBuffer(atlas.buffer(set)));
         }
-    auto kernel = Kernel::create(vulkan, spirv::blend_probes_comp, bindings, sizeof(DispatchedItems), pipelines,
-                                 atlas.setCount() * static_cast<uint32_t>(work_.size()));
+    auto kernel =
+        Kernel::create(vulkan, {spirv::blend_probes_comp, spirv::blend_probes_comp_storage}, bindings,
+                       sizeof(DispatchedItems), pipelines, atlas.setCount() * static_cast<uint32_t>(work_.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};

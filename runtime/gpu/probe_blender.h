@@ -23,7 +23,7 @@ class ProbeBlender {
 
    private:
     struct Work {
-        TexelBuffer items, terms;
+        GpuTable items, terms;
     };
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, Transfer& transfer);
     Expected<void> createWork(const VulkanContext& vulkan, const Planner& planner);
@@ -31,7 +31,7 @@ class ProbeBlender {
                                 const ProbeAtlas& atlas);
 
     const ProbeData* data_ = nullptr;
-    TexelBuffer places_, numbers_, records_16_, records_8_, records_4_;
+    GpuTable places_, numbers_, records_16_, records_8_, records_4_;
     std::vector<Work> work_;
     Kernel kernel_;
     uint32_t groups_x_max_ = 0;

@@ -5,6 +5,7 @@
 #include <gpu/vk_result.h>
 #include <probes/grid_table.h>
 #include <spirv/resample_probes_comp.h>
+#include <spirv/resample_probes_comp_storage.h>
 
 #include <cstring>
 
@@ -55,21 +56,20 @@ Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, con
                                    std::ranges::fill(piece, std::byte{0xff});  // no_tetrahedron
                                }));
     for (uint32_t i = 0; i < lists; ++i) {
-        auto items = createTexelBuffer(vulkan, models.itemsMax() * sizeof(ResampleItem), VK_FORMAT_R32G32B32A32_UINT,
-                                       MemoryUse::Upload);
+        auto items = createTable(vulkan, models.itemsMax() * sizeof(ResampleItem), VK_FORMAT_R32G32B32A32_UINT,
+                                 MemoryUse::Upload);
         if (!items) return std::unexpected(std::move(items.error()));
         resampler.work_.push_back({std::move(*items), 0});
     }
     std::vector<KernelBinding> bindings;
     for (uint32_t set = 0; set < atlas.setCount(); ++set)
         for (const Work& work : resampler.work_)
-            bindings.insert(
-                bindings.end(),
-                {KernelBinding::ofTexels(work.items.view.get()), KernelBinding::ofBuffer(grid_table),
-                 KernelBinding::ofBuffer(atlas.buffer(set)), KernelBinding::ofBuffer(resampler.hints_.buffer.get())});
+            bindings.insert(bindings.end(), {KernelBinding::ofTable(work.items), KernelBinding::ofBuffer(grid_table),
+                                             KernelBinding::ofBuffer(atlas.buffer(set)),
+                                             KernelBinding::ofBuffer(resampler.hints_.buffer.get())});
     const Specialisation pipelines[] = {{static_cast<uint32_t>(data.color_format)}};
-    auto kernel = Kernel::create(vulkan, spirv::resample_probes_comp, bindings, sizeof(ResampledItems), pipelines,
-                                 atlas.setCount() * lists);
+    auto kernel = Kernel::create(vulkan, {spirv::resample_probes_comp, spirv::resample_probes_comp_storage}, bindings,
+                                 sizeof(ResampledItems), pipelines, atlas.setCount() * lists);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     resampler.kernel_ = std::move(*kernel);
     return resampler;

@@ -28,7 +28,7 @@ class ProbeResampler {
 
    private:
     struct Work {
-        TexelBuffer items;
+        GpuTable items;
         uint32_t item_count = 0;
     };
     std::vector<Work> work_;

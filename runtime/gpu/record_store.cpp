@@ -25,8 +25,7 @@ Expected<RecordStore> RecordStore::create(const VulkanContext& vulkan, const Pac
     }
     const uint64_t all = std::accumulate(store.counts_.begin(), store.counts_.end(), uint64_t{0});
     const uint64_t records = bytes_max == 0 ? all : std::min(all, bytes_max / sizeof(TexelRecord) / 2 * 2);
-    auto buffer =
-        createTexelBuffer(vulkan, records * sizeof(TexelRecord), VK_FORMAT_R32G32B32A32_UINT, MemoryUse::Device);
+    auto buffer = createTable(vulkan, records * sizeof(TexelRecord), VK_FORMAT_R32G32B32A32_UINT, MemoryUse::Device);
     if (!buffer) return std::unexpected(std::move(buffer.error()));
     store.buffer_ = std::move(*buffer);
     if (records < all) {

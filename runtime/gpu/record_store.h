@@ -16,7 +16,7 @@ class RecordStore {
     // Room for `bytes_max` of records, 0 for all of them. `data` must outlive it.
     static Expected<RecordStore> create(const VulkanContext& vulkan, const PackData& data, uint64_t bytes_max);
 
-    VkBufferView view() const { return buffer_.view.get(); }
+    const GpuTable& table() const { return buffer_; }
     VkBuffer buffer() const { return buffer_.buffer.buffer.get(); }
     uint64_t deviceBytes() const { return buffer_.buffer.size_bytes; }
 
@@ -42,7 +42,7 @@ class RecordStore {
 
    private:
     const PackData* data_ = nullptr;
-    TexelBuffer buffer_;
+    GpuTable buffer_;
     RecordPool pool_;             // where there is not room for all
     std::vector<uint64_t> home_;  // per contribution, its range where there is room for all; empty where there is not
     std::vector<std::optional<uint64_t>> first_;  // per contribution

@@ -44,32 +44,32 @@ auto fillFrom(const std::vector<Run>& runs, Value value) {
     };
 }
 
-inline Expected<TexelBuffer> uploadTable(const VulkanContext& vulkan, Transfer& transfer, VkDeviceSize size_bytes,
-                                         VkFormat format,
-                                         const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill) {
-    auto table = createTexelBuffer(vulkan, size_bytes, format, MemoryUse::Device);
+inline Expected<GpuTable> uploadTable(const VulkanContext& vulkan, Transfer& transfer, VkDeviceSize size_bytes,
+                                      VkFormat format,
+                                      const std::function<void(VkDeviceSize, std::span<std::byte>)>& fill) {
+    auto table = createTable(vulkan, size_bytes, format, MemoryUse::Device);
     if (!table) return table;
     if (auto ok = transfer.upload(table->buffer.buffer.get(), size_bytes, fill); !ok)
         return std::unexpected(std::move(ok.error()));
     return table;
 }
 
-inline Expected<void> keep(Expected<TexelBuffer> made, TexelBuffer& slot) {
+inline Expected<void> keep(Expected<GpuTable> made, GpuTable& slot) {
     if (!made) return std::unexpected(std::move(made.error()));
     slot = std::move(*made);
     return {};
 }
 
-inline uint64_t bytesOf(std::initializer_list<const TexelBuffer*> tables) {
+inline uint64_t bytesOf(std::initializer_list<const GpuTable*> tables) {
     uint64_t sum = 0;
-    for (const TexelBuffer* table : tables) sum += table->buffer.size_bytes;
+    for (const GpuTable* table : tables) sum += table->buffer.size_bytes;
     return sum;
 }
 
 // A whole vector as it is.
 template <class T>
-Expected<TexelBuffer> uploadTable(const VulkanContext& vulkan, Transfer& transfer, const std::vector<T>& values,
-                                  VkFormat format) {
+Expected<GpuTable> uploadTable(const VulkanContext& vulkan, Transfer& transfer, const std::vector<T>& values,
+                               VkFormat format) {
     const auto bytes = std::as_bytes(std::span(values));
     return uploadTable(vulkan, transfer, bytes.size(), format,
                        [bytes](VkDeviceSize offset, std::span<std::byte> piece) {

@@ -8,6 +8,7 @@
 #include <gpu/vk_struct.h>
 #include <pack/batches.h>
 #include <spirv/blend_texels_comp.h>
+#include <spirv/blend_texels_comp_storage.h>
 #include <update/device_places.h>
 
 #include <algorithm>
@@ -47,7 +48,8 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t a
     const uint64_t base_bytes = places.receivers * sizeof(TexelRecord);
     const uint64_t work_bytes = wide_bytes * std::max(planner.itemsMax(), planner.termsMax());
     // Each buffer has an allocation of its own.
-    const uint64_t bytes_max = std::min(limits.maxTexelBufferElements * wide_bytes, allocation_bytes_max);
+    const uint64_t texels_max = limits.maxTexelBufferElements, storage_max = limits.maxStorageBufferRange;
+    const uint64_t bytes_max = std::min(std::max(texels_max * wide_bytes, storage_max), allocation_bytes_max);
     constexpr uint32_t index_end = 1u << item_index_bits, count_end = 1u << item_count_bits;
     if (std::max(planner.itemsMax(), planner.termsMax()) >= index_end || planner.overlapMax() >= count_end ||
         places.receivers >= device_receivers_max)
@@ -62,18 +64,17 @@ Expected<void> checkTexelLimits(const VkPhysicalDeviceLimits& limits, uint64_t a
     return fail(
         ErrorCode::Unsupported,
         fmt::format("The pack's dynamic light ({} bytes of records, {} bytes of base, {} bytes of work list) "
-                    "exceeds what this Vulkan device holds and reads as one texel buffer, {} bytes. Cook with fewer "
-                    "texels per metre or a higher activity threshold, or, where it is the records alone, "
-                    "load fewer at a time: start without records, with a smaller records_bytes_max.",
-                    payload_bytes, base_bytes, work_bytes, bytes_max));
+                    "exceeds what this Vulkan device holds in an allocation ({} bytes) and reads as one buffer ({} "
+                    "texels of 16 bytes, or a storage buffer of {} bytes): {} bytes. Cook with fewer texels per metre "
+                    "or a higher activity threshold, or, where it is the records alone, load fewer at a time: start "
+                    "without records, with a smaller records_bytes_max.",
+                    payload_bytes, base_bytes, work_bytes, allocation_bytes_max, texels_max, storage_max, bytes_max));
 }
 
 Expected<TexelBlender> TexelBlender::create(const VulkanContext& vulkan, const PackData& data, const Planner& planner,
                                             std::span<const LightmapPages> page_sets, Transfer& transfer,
                                             const RuntimeOptions& options) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    const VkPhysicalDeviceLimits& limits = properties.limits;
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
     const VkDeviceSize allocation_max = allocationBytesMax(vulkan.physical_device);
     DevicePlaces places = placesOf(data);
     DIMMER_TRY(checkTexelLimits(limits, allocation_max, places, planner, options.records_bytes_max));
@@ -131,10 +132,10 @@ Expected<void> TexelBlender::uploadRecords(const PackData& data, Transfer& trans
 
 Expected<void> TexelBlender::createWork(const VulkanContext& vulkan, const Planner& planner) {
     Work work;
-    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.itemsMax() * sizeof(TexelItem), item_format, MemoryUse::Upload),
-                    work.items));
-    DIMMER_TRY(keep(createTexelBuffer(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload),
-                    work.terms));
+    DIMMER_TRY(
+        keep(createTable(vulkan, planner.itemsMax() * sizeof(TexelItem), item_format, MemoryUse::Upload), work.items));
+    DIMMER_TRY(
+        keep(createTable(vulkan, planner.termsMax() * sizeof(WorkTerm), wide_format, MemoryUse::Upload), work.terms));
     work_.push_back(std::move(work));
     return {};
 }
@@ -149,17 +150,18 @@ Expected<void> TexelBlender::createKernel(const VulkanContext& vulkan, const Pac
     for (const LightmapPages& pages : page_sets)
         for (const Work& work : work_)
             bindings.insert(bindings.end(), {
-                                                KernelBinding::ofTexels(places_.view.get()),
-                                                KernelBinding::ofTexels(base_.view.get()),
-                                                KernelBinding::ofTexels(records_.view()),
-                                                KernelBinding::ofTexels(work.items.view.get()),
-                                                KernelBinding::ofTexels(work.terms.view.get()),
-                                                KernelBinding::ofTexels(batches_.view.get()),
+                                                KernelBinding::ofTable(places_),
+                                                KernelBinding::ofTable(base_),
+                                                KernelBinding::ofTable(records_.table()),
+                                                KernelBinding::ofTable(work.items),
+                                                KernelBinding::ofTable(work.terms),
+                                                KernelBinding::ofTable(batches_),
                                                 KernelBinding::ofImage(pages.irradianceStorageView()),
                                                 KernelBinding::ofImage(pages.directionStorageView()),
                                             });
-    auto kernel = Kernel::create(vulkan, spirv::blend_texels_comp, bindings, sizeof(DispatchedItems), pipelines,
-                                 static_cast<uint32_t>(page_sets.size() * work_.size()));
+    auto kernel =
+        Kernel::create(vulkan, {spirv::blend_texels_comp, spirv::blend_texels_comp_storage}, bindings,
+                       sizeof(DispatchedItems), pipelines, static_cast<uint32_t>(page_sets.size() * work_.size()));
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};

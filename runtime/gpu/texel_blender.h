@@ -31,7 +31,7 @@ class TexelBlender : public TexelExecutor {
    private:
     // Written anew by the host for every update that takes it.
     struct Work {
-        TexelBuffer items, terms;
+        GpuTable items, terms;
     };
 
     Expected<void> createTables(const VulkanContext& vulkan, const PackData& data, DevicePlaces places,
@@ -43,7 +43,7 @@ class TexelBlender : public TexelExecutor {
     void recordDispatch(VkCommandBuffer commands, uint32_t first_item, uint32_t item_count) const;
     uint32_t dispatchGroup(VkCommandBuffer commands, const WorkList& work, const WorkGroup& group) const;
 
-    TexelBuffer places_, base_, batches_;
+    GpuTable places_, base_, batches_;
     RecordStore records_;
     std::vector<Work> work_;  // as many as updates may be on their way
     Kernel kernel_;

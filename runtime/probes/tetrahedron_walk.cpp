@@ -3,6 +3,7 @@
 #include <format/reciprocal.h>
 
 #include <algorithm>
+#include <cmath>
 
 namespace dimmer {
 namespace {
@@ -35,14 +36,17 @@ float determinant(const Vec3& a, const Vec3& b, const Vec3& c) {
     return a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0]);
 }
 
-// Ratios of the volumes between the point and each face to the whole. Not finite for a flat tetrahedron.
+// Ratios of the volumes between the point and each face to the whole. Where that is nothing to a float, as of a flat
+// tetrahedron, they are large instead, so that a walk goes on, and numbers: a shader's compiler may turn a comparison
+// round as if there were no others. (Of positions 1e12 m apart they need not be; the cooker refuses 1e6 m.)
 std::array<float, 4> barycentricOf(const GlobalGrid& grid, uint32_t tetrahedron, const Vec3& point) {
     const auto& probes = grid.tetrahedra[tetrahedron].probes;
     const Vec3 a = fromTo(point, grid.positions[probes[0]]), b = fromTo(point, grid.positions[probes[1]]);
     const Vec3 c = fromTo(point, grid.positions[probes[2]]), d = fromTo(point, grid.positions[probes[3]]);
     const std::array<float, 4> volumes = {determinant(b, c, d), determinant(a, d, c), determinant(a, b, d),
                                           determinant(a, c, b)};
-    const float inverse = reciprocal(volumes[0] + volumes[1] + volumes[2] + volumes[3]);
+    const float sum = volumes[0] + volumes[1] + volumes[2] + volumes[3];
+    const float inverse = std::abs(sum) > flat_volume ? reciprocal(sum) : flat_inverse;
     return {volumes[0] * inverse, volumes[1] * inverse, volumes[2] * inverse, volumes[3] * inverse};
 }
 

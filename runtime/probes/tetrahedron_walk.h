@@ -16,6 +16,8 @@ inline constexpr uint32_t hinted_steps_max = 32, walk_steps_max = 1024;
 // weights jump by at most this share where two tetrahedra disagree, but for what their tables say is seen: those of
 // neighbours need not agree at a face, and near doors light jumps there by up to a tenth.
 inline constexpr float inside_tolerance = 1e-4f;
+// Six times the volume of a tetrahedron, in m3, that has none; what stands in for 1 / it.
+inline constexpr float flat_volume = 1e-30f, flat_inverse = 1e8f;
 // So near to a face, neighbours are compared: of those that take a point in, the one that it is deepest in gives the
 // light. Round an edge there are many, and a few steps need not find it: there, a walk ignores its hint.
 inline constexpr uint32_t settle_steps_max = 4;

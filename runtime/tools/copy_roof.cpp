@@ -3,6 +3,7 @@
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
 #include <spirv/copy_roof_comp.h>
+#include <spirv/copy_roof_comp_storage.h>
 
 #include <algorithm>
 #include <array>
@@ -63,8 +64,8 @@ Expected<CopyRoof> CopyRoof::create(const VulkanContext& vulkan, uint64_t read_b
     roof.timer_ = std::move(**timer);
 
     // Streams of loads are padded to whole loads per store.
-    auto source = createTexelBuffer(vulkan, read_bytes_max + written_bytes_max + unit_bytes,
-                                    VK_FORMAT_R32G32B32A32_UINT, MemoryUse::Device);
+    auto source = createTable(vulkan, read_bytes_max + written_bytes_max + unit_bytes, VK_FORMAT_R32G32B32A32_UINT,
+                              MemoryUse::Device);
     if (!source) return std::unexpected(std::move(source.error()));
     roof.source_ = std::move(*source);
     DIMMER_TRY(roof.transfer_->upload(
@@ -123,10 +124,11 @@ Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
             for (uint32_t loads = 1; loads <= loads_max; ++loads)
                 pipelines.push_back({std::min(variant.workgroup_size, group_lanes_max_), loads, variant.lane_stores,
                                      to_pages, variant.one_stream});
-    const KernelBinding bindings[] = {
-        KernelBinding::ofTexels(source_.view.get()), KernelBinding::ofBuffer(target_.buffer.get()),
-        KernelBinding::ofImage(pages_[0].view.get()), KernelBinding::ofImage(pages_[1].view.get())};
-    auto kernel = Kernel::create(vulkan, spirv::copy_roof_comp, bindings, sizeof(Constants), pipelines);
+    const KernelBinding bindings[] = {KernelBinding::ofTable(source_), KernelBinding::ofBuffer(target_.buffer.get()),
+                                      KernelBinding::ofImage(pages_[0].view.get()),
+                                      KernelBinding::ofImage(pages_[1].view.get())};
+    auto kernel = Kernel::create(vulkan, {spirv::copy_roof_comp, spirv::copy_roof_comp_storage}, bindings,
+                                 sizeof(Constants), pipelines);
     if (!kernel) return std::unexpected(std::move(kernel.error()));
     kernel_ = std::move(*kernel);
     return {};

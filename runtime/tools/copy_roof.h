@@ -38,7 +38,7 @@ class CopyRoof {
     VulkanContext vulkan_;
     std::optional<Transfer> transfer_;
     std::optional<UpdateTimer> timer_;
-    TexelBuffer source_;
+    GpuTable source_;
     GpuBuffer target_;
     Image pages_[2];
     std::optional<Kernel> kernel_;

@@ -39,21 +39,14 @@ VkDebugUtilsMessengerCreateInfoEXT messengerInfo(MessageLog& log) {
     return info;
 }
 
-// Of the installed loader, which is there. `instance`: null for the functions that need none yet.
-template <class Function>
-Function loaderFunction(VkInstance instance, const char* name) {
-    return reinterpret_cast<Function>(installedLoader()(instance, name));
-}
-
-bool layerInstalled(const char* name) {
-    const auto vkEnumerateInstanceLayerProperties =
-        loaderFunction<PFN_vkEnumerateInstanceLayerProperties>(VK_NULL_HANDLE, "vkEnumerateInstanceLayerProperties");
+// Of all that `enumerate(count, items)` lists, whether one's `name` member is that.
+template <class Item, size_t size, class Enumerate>
+bool lists(Enumerate&& enumerate, char (Item::*member)[size], std::string_view name) {
     uint32_t count = 0;
-    vkEnumerateInstanceLayerProperties(&count, nullptr);
-    std::vector<VkLayerProperties> layers(count);
-    vkEnumerateInstanceLayerProperties(&count, layers.data());
-    return std::any_of(layers.begin(), layers.end(),
-                       [&](const auto& layer) { return std::string_view(layer.layerName) == name; });
+    enumerate(&count, nullptr);
+    std::vector<Item> items(count);
+    enumerate(&count, items.data());
+    return std::ranges::any_of(items, [&](const Item& item) { return item.*member == name; });
 }
 
 // A family that draws and computes, else, where drawing is not asked for, one that computes.
@@ -108,28 +101,54 @@ struct HeadlessDevice::Impl {
     MessageLog log;  // before the instance: its messenger writes here to the very end
     VulkanFunctions functions;
     VulkanContext vulkan;
+    PFN_vkGetInstanceProcAddr loader = nullptr;
     VkDebugUtilsMessengerEXT messenger = VK_NULL_HANDLE;
     std::string name, driver;
 
     ~Impl() {
         if (vulkan.device) vkDestroyDevice(vulkan.device, nullptr);
         if (messenger) {
-            const auto destroy =
-                loaderFunction<PFN_vkDestroyDebugUtilsMessengerEXT>(vulkan.instance, "vkDestroyDebugUtilsMessengerEXT");
+            const auto destroy = function<PFN_vkDestroyDebugUtilsMessengerEXT>("vkDestroyDebugUtilsMessengerEXT");
             destroy(vulkan.instance, messenger, nullptr);
         }
-        if (vulkan.instance)
-            loaderFunction<PFN_vkDestroyInstance>(vulkan.instance, "vkDestroyInstance")(vulkan.instance, nullptr);
+        if (vulkan.instance) function<PFN_vkDestroyInstance>("vkDestroyInstance")(vulkan.instance, nullptr);
     }
 
+    // Before there is an instance, those alone that need none.
+    template <class Function>
+    Function function(const char* called) const {
+        return reinterpret_cast<Function>(loader(vulkan.instance, called));
+    }
+    bool layerInstalled(const char* layer) const;
+    bool instanceHas(const char* extension) const;
+    bool deviceHas(const char* extension) const;
     Expected<void> createInstance(bool validation);
     Expected<void> choosePhysicalDevice(bool graphics);
     Expected<void> createDevice(bool compute_queue);
 };
 
+bool HeadlessDevice::Impl::layerInstalled(const char* layer) const {
+    const auto enumerate = function<PFN_vkEnumerateInstanceLayerProperties>("vkEnumerateInstanceLayerProperties");
+    return lists(enumerate, &VkLayerProperties::layerName, layer);
+}
+
+bool HeadlessDevice::Impl::instanceHas(const char* extension) const {
+    const auto enumerate =
+        function<PFN_vkEnumerateInstanceExtensionProperties>("vkEnumerateInstanceExtensionProperties");
+    const auto all = [&](uint32_t* count, VkExtensionProperties* items) { enumerate(nullptr, count, items); };
+    return lists(all, &VkExtensionProperties::extensionName, extension);
+}
+
+bool HeadlessDevice::Impl::deviceHas(const char* extension) const {
+    const auto enumerate = function<PFN_vkEnumerateDeviceExtensionProperties>("vkEnumerateDeviceExtensionProperties");
+    const auto all = [&](uint32_t* count, VkExtensionProperties* items) {
+        enumerate(vulkan.physical_device, nullptr, count, items);
+    };
+    return lists(all, &VkExtensionProperties::extensionName, extension);
+}
+
 Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
-    if (!installedLoader())
-        return fail(ErrorCode::Unsupported, "Vulkan's loader is not installed (Debian: libvulkan1).");
+    if (!loader) return fail(ErrorCode::Unsupported, "Vulkan's loader is not installed (Debian: libvulkan1).");
     if (validation && !layerInstalled(validation_layer))
         return fail(
             ErrorCode::Unsupported,
@@ -146,28 +165,33 @@ Expected<void> HeadlessDevice::Impl::createInstance(bool validation) {
     VkDebugUtilsMessengerCreateInfoEXT debug = messengerInfo(log);
     debug.pNext = &features;
 
-    const char* extensions[] = {VK_EXT_DEBUG_UTILS_EXTENSION_NAME};
+    std::vector<const char*> extensions;
     auto info = vkStruct<VkInstanceCreateInfo>(VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO);
     info.pApplicationInfo = &application;
+    // Devices that lack a part of Vulkan (MoltenVK's) the loader shows to those alone that ask for them.
+    if (instanceHas(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME)) {
+        extensions.push_back(VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME);
+        info.flags = VK_INSTANCE_CREATE_ENUMERATE_PORTABILITY_BIT_KHR;
+    }
     if (validation) {
         info.pNext = &debug;
         info.enabledLayerCount = 1;
         info.ppEnabledLayerNames = &validation_layer;
-        info.enabledExtensionCount = 1;
-        info.ppEnabledExtensionNames = extensions;
+        extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
     }
-    const auto vkCreateInstance = loaderFunction<PFN_vkCreateInstance>(VK_NULL_HANDLE, "vkCreateInstance");
+    info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
+    info.ppEnabledExtensionNames = extensions.data();
+    const auto vkCreateInstance = function<PFN_vkCreateInstance>("vkCreateInstance");
     const VkResult created = vkCreateInstance(&info, nullptr, &vulkan.instance);
     if (created == VK_ERROR_INCOMPATIBLE_DRIVER)
         return fail(ErrorCode::Unsupported, fmt::format("No Vulkan driver was found. {}", driver_on_cpu));
     if (created < 0) return vulkanError(created, "vkCreateInstance");
-    auto loaded = VulkanFunctions::load(nullptr, vulkan.instance);
+    auto loaded = VulkanFunctions::load(loader, vulkan.instance);
     if (!loaded) return std::unexpected(std::move(loaded.error()));
     functions = std::move(*loaded);
 
     if (validation) {
-        const auto create =
-            loaderFunction<PFN_vkCreateDebugUtilsMessengerEXT>(vulkan.instance, "vkCreateDebugUtilsMessengerEXT");
+        const auto create = function<PFN_vkCreateDebugUtilsMessengerEXT>("vkCreateDebugUtilsMessengerEXT");
         const VkDebugUtilsMessengerCreateInfoEXT messenger_info = messengerInfo(log);
         DIMMER_VK(create, vulkan.instance, &messenger_info, nullptr, &messenger);
     }
@@ -225,6 +249,16 @@ Expected<void> HeadlessDevice::Impl::createDevice(bool compute_queue) {
     auto info = vkStruct<VkDeviceCreateInfo>(VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, &features);
     info.queueCreateInfoCount = compute && !same_family ? 2 : 1;
     info.pQueueCreateInfos = queues;
+    // Whoever has the extension demands that it is enabled. Pages are written through views of another format.
+    const char* const portability = VK_KHR_PORTABILITY_SUBSET_EXTENSION_NAME;
+    auto subset = vkStruct<VkPhysicalDevicePortabilitySubsetFeaturesKHR>(
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PORTABILITY_SUBSET_FEATURES_KHR);
+    if (deviceHas(portability)) {
+        subset.imageViewFormatReinterpretation = VK_TRUE;
+        features.pNext = &subset;
+        info.enabledExtensionCount = 1;
+        info.ppEnabledExtensionNames = &portability;
+    }
     DIMMER_VK(vkCreateDevice, vulkan.physical_device, &info, nullptr, &vulkan.device);
     vkGetDeviceQueue(vulkan.device, vulkan.queue_family, 0, &vulkan.queue);
     if (!compute) return {};
@@ -235,6 +269,8 @@ Expected<void> HeadlessDevice::Impl::createDevice(bool compute_queue) {
 
 Expected<HeadlessDevice> HeadlessDevice::create(const HeadlessOptions& options) {
     auto impl = std::make_unique<Impl>();
+    impl->vulkan.get_instance_proc_addr = options.get_instance_proc_addr;
+    impl->loader = options.get_instance_proc_addr ? options.get_instance_proc_addr : installedLoader();
     DIMMER_TRY(impl->createInstance(options.validation));
     DIMMER_TRY(impl->choosePhysicalDevice(options.graphics));
     DIMMER_TRY(impl->createDevice(options.compute_queue));

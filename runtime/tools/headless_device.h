@@ -18,6 +18,8 @@ struct HeadlessOptions {
     // Also ask for VulkanContext::compute_queue, where the device has a second queue to give. Whoever samples pages on
     // the first queue then has to wait for the runtime's semaphore.
     bool compute_queue = false;
+    // What gives Vulkan's functions, as in VulkanContext. Null: the installed loader.
+    PFN_vkGetInstanceProcAddr get_instance_proc_addr = nullptr;
 };
 
 // An instance, a device, and one queue; a discrete GPU is preferred, then an integrated, a virtual and a software one.

@@ -2,11 +2,16 @@
 #include <format/reciprocal.h>
 #include <gtest/gtest.h>
 #include <spirv/blend_probes_comp.h>
+#include <spirv/blend_probes_comp_storage.h>
 #include <spirv/blend_texels_comp.h>
+#include <spirv/blend_texels_comp_storage.h>
 #include <spirv/gather_texels_comp.h>
+#include <spirv/gather_texels_comp_storage.h>
 #include <spirv/resample_probes_comp.h>
+#include <spirv/resample_probes_comp_storage.h>
 #include <spirv/sample_lightmap_comp.h>
 #include <spirv/scatter_texels_comp.h>
+#include <spirv/scatter_texels_comp_storage.h>
 
 #include <algorithm>
 #include <bit>
@@ -57,20 +62,30 @@ size_t contractibleInstructions(std::span<const uint32_t> words) {
 
 TEST(ExactArithmetic, KernelsLetNoDeviceJoinProductsAndSums) {
     EXPECT_EQ(contractibleInstructions(spirv::blend_texels_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::blend_texels_comp_storage), 0u);
     EXPECT_EQ(contractibleInstructions(spirv::blend_probes_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::blend_probes_comp_storage), 0u);
     EXPECT_EQ(contractibleInstructions(spirv::resample_probes_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::resample_probes_comp_storage), 0u);
     EXPECT_EQ(contractibleInstructions(spirv::gather_texels_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::gather_texels_comp_storage), 0u);
     EXPECT_EQ(contractibleInstructions(spirv::scatter_texels_comp), 0u);
+    EXPECT_EQ(contractibleInstructions(spirv::scatter_texels_comp_storage), 0u);
     EXPECT_GT(contractibleInstructions(spirv::sample_lightmap_comp), 0u)
         << "which agrees with the CPU but for rounding";
 }
 
 TEST(ExactArithmetic, KernelsAskForNothingThatDevicesRoundInTheirOwnWay) {
     EXPECT_EQ(inexactInstructions(spirv::blend_texels_comp), 0u);
+    EXPECT_EQ(inexactInstructions(spirv::blend_texels_comp_storage), 0u);
     EXPECT_EQ(inexactInstructions(spirv::blend_probes_comp), 0u);
+    EXPECT_EQ(inexactInstructions(spirv::blend_probes_comp_storage), 0u);
     EXPECT_EQ(inexactInstructions(spirv::resample_probes_comp), 0u);
+    EXPECT_EQ(inexactInstructions(spirv::resample_probes_comp_storage), 0u);
     EXPECT_EQ(inexactInstructions(spirv::gather_texels_comp), 0u);
+    EXPECT_EQ(inexactInstructions(spirv::gather_texels_comp_storage), 0u);
     EXPECT_EQ(inexactInstructions(spirv::scatter_texels_comp), 0u);
+    EXPECT_EQ(inexactInstructions(spirv::scatter_texels_comp_storage), 0u);
     EXPECT_GT(inexactInstructions(spirv::sample_lightmap_comp), 0u) << "which takes roots";
 }
 

@@ -15,8 +15,9 @@ inline VkCommandBuffer untouchedCommands() {
 
 class GpuTest : public testing::Test {
    protected:
-    static void SetUpTestSuite() {
-        if (auto made = HeadlessDevice::create({.validation = true}))
+    static void SetUpTestSuite() { createDevice(nullptr); }
+    static void createDevice(PFN_vkGetInstanceProcAddr loader) {
+        if (auto made = HeadlessDevice::create({.validation = true, .get_instance_proc_addr = loader}))
             device_ = std::move(*made);
         else
             problem_ = made.error().message;

@@ -5,6 +5,7 @@
 #include <gpu/kernel.h>
 #include <gpu/transfer.h>
 #include <gpu/vk_struct.h>
+#include <probes/tetrahedron_walk.h>
 #include <spirv/sample_grid_comp.h>
 
 #include "gpu_fixture.h"
@@ -47,7 +48,7 @@ std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime
         KernelBinding::ofBuffer(model.buffer.get()), KernelBinding::ofBuffer(input.buffer.get()),
         KernelBinding::ofBuffer(output.buffer.get())};
     const Specialisation no_constants[] = {{}};
-    const Kernel kernel = valueOf(Kernel::create(vulkan, spirv::sample_grid_comp, bindings, 4, no_constants));
+    const Kernel kernel = valueOf(Kernel::create(vulkan, {spirv::sample_grid_comp}, bindings, 4, no_constants));
     auto transfer = valueOf(Transfer::create(vulkan, MemoryUse::Readback));
     const auto done = transfer.run([&](VkCommandBuffer commands) {
         kernel.bind(commands, 0);
@@ -61,6 +62,24 @@ std::vector<Result> onDevice(const VulkanContext& vulkan, const Runtime& runtime
     if (!done) throw std::runtime_error(done.error().message);
     std::memcpy(results.data(), output.mapped, output.size_bytes);
     return results;
+}
+
+// A tetrahedron, and the flat one that every walk begins in: four probes of the floor, one of them within the triangle
+// of the others, so that for a place above the volumes cancel to nothing.
+GlobalGrid gridWithAFlatTetrahedron() {
+    GlobalGrid grid;
+    grid.positions = {{0, 0, 0}, {4, 0, 0}, {0, 4, 0}, {0, 0, 4}, {1, 1, 0}};
+    grid.levels.assign(5, 0);
+    grid.tetrahedra = {{{0, 1, 2, 4}, {1, 1, 1, 1}}, {{0, 1, 2, 3}}};
+    grid.start = {{0, 0, 0}, {4, 4, 4}, {1, 1, 1}};
+    grid.starts = {0};
+    return grid;
+}
+
+TEST(TetrahedronWalk, GoesThroughWhatIsFlat) {
+    const GridPlace place = locate(gridWithAFlatTetrahedron(), {1, 0.5f, 1});
+    EXPECT_EQ(place.tetrahedron, 1u);
+    EXPECT_EQ(place.barycentric, (Vec4{0.375f, 0.25f, 0.125f, 0.25f}));
 }
 
 class GridGlslTest : public test::GpuTest {};
@@ -122,6 +141,24 @@ TEST_F(GridGlslTest, AgreesWithTheCpu) {
             for (size_t c = 0; c < 3; ++c) ASSERT_TRUE(r.model_lux[c] == 0 && r.shadowed_lux[c] == 0);
         EXPECT_EQ(sampler.sample(ModelSlot{}, {5, 2, 6}, {0, 1, 0}), (std::array<float, 3>{}));
     }
+}
+
+TEST_F(GridGlslTest, WalksThroughWhatIsFlatAsTheCpuDoes) {
+    test::Random random(22);
+    PackData data = test::modelPack(2, 5, [](glm::vec3) { return glm::vec3(1); });
+    data.probes.global = gridWithAFlatTetrahedron();
+    data.probes.base.resize(5);
+    for (ProbeRecord& probe : data.probes.base) probe = test::randomProbe(random, data.color_format);
+    const Pack pack = test::packOf(std::move(data));
+    Runtime gpu = runtimeOf(pack, {.moving_probes_max = 64});
+    CpuRuntime cpu(pack, 1, 64);
+    for (LightState* state : {static_cast<LightState*>(&gpu), static_cast<LightState*>(&cpu)})
+        ASSERT_TRUE(state->addModel({{0.25f, 0.25f, 0.25f}, {1.25f, 1.25f, 1.25f}, {3, 3, 3}}, {}));
+    ASSERT_TRUE(gpu.submit());
+    cpu.update();
+    const auto pages = gpu.readPages();
+    ASSERT_TRUE(pages) << pages.error().message;
+    EXPECT_TRUE(std::ranges::equal(pages->probes, cpu.probes()));
 }
 
 }  // namespace

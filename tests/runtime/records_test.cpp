@@ -104,24 +104,44 @@ TEST(TexelLimits, RecordsLargerThanOneAllocationAreRefused) {
     EXPECT_THAT(refused.error().message, HasSubstr("records_bytes_max"));
 }
 
-class TexelBuffers : public test::GpuTest {};
+// What is too much for a texel buffer may be a storage buffer.
+TEST(TexelLimits, OfTheTwoWaysToReadATableOneIsEnough) {
+    const PackData data = test::randomPack(79);
+    const DevicePlaces places = placesOf(data);
+    const Planner planner(data);
+    const auto bytes = static_cast<uint32_t>(places.records * sizeof(TexelRecord));
+    VkPhysicalDeviceLimits limits{};
+    limits.maxTexelBufferElements = 65536 / 16;
+    limits.maxStorageBufferRange = bytes;
+    EXPECT_TRUE(checkTexelLimits(limits, UINT64_MAX, places, planner, 0));
+    --limits.maxStorageBufferRange;
+    const auto refused = checkTexelLimits(limits, UINT64_MAX, places, planner, 0);
+    ASSERT_FALSE(refused);
+    for (const std::string& figure : {fmt::format("{} bytes of records", bytes), std::string("4096 texels of 16 bytes"),
+                                      fmt::format("a storage buffer of {} bytes", bytes - 1)})
+        EXPECT_THAT(refused.error().message, HasSubstr(figure));
+}
+
+class GpuTables : public test::GpuTest {};
 
 // Before any memory is taken; the layers would name a view of too many texels.
-TEST_F(TexelBuffers, OfMoreTexelsThanTheDeviceReadsAreRefused) {
+TEST_F(GpuTables, OfMoreThanTheDeviceReadsInEitherWayAreRefused) {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(device().context().physical_device, &properties);
     const uint64_t texels_max = properties.limits.maxTexelBufferElements;
+    const uint64_t storage_max = properties.limits.maxStorageBufferRange;
     const std::pair<VkFormat, uint64_t> texel_bytes[] = {{VK_FORMAT_R8G8_UINT, 2},
                                                          {VK_FORMAT_R16_UINT, 2},
                                                          {VK_FORMAT_R32_UINT, 4},
                                                          {VK_FORMAT_R32G32_UINT, 8},
                                                          {VK_FORMAT_R32G32B32A32_UINT, 16}};
     for (const auto& [format, bytes] : texel_bytes) {
-        EXPECT_TRUE(createTexelBuffer(device().context(), 1000 * bytes, format, MemoryUse::Device));
-        const auto refused = createTexelBuffer(device().context(), (texels_max + 1) * bytes, format, MemoryUse::Device);
+        EXPECT_TRUE(createTable(device().context(), 1000 * bytes, format, MemoryUse::Device));
+        const uint64_t too_many = std::max(texels_max, storage_max / bytes) + 1;
+        const auto refused = createTable(device().context(), too_many * bytes, format, MemoryUse::Device);
         ASSERT_FALSE(refused) << format;
         EXPECT_EQ(refused.error().code, ErrorCode::Unsupported);
-        EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("{} texels", texels_max + 1)));
+        EXPECT_THAT(refused.error().message, HasSubstr(fmt::format("{} bytes exceeds", too_many * bytes)));
     }
 }
 

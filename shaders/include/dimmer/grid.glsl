@@ -29,6 +29,8 @@ const uint dimmer_hinted_steps_max = 32u;  // these as in tetrahedron_walk.h
 const uint dimmer_walk_steps_max = 1024u;
 const uint dimmer_settle_steps_max = 4u;
 const float dimmer_inside_tolerance = 1e-4;
+const float dimmer_flat_volume = 1e-30;
+const float dimmer_flat_inverse = 1e8;
 const float dimmer_visibility_slope = 8.0;
 const float dimmer_visible_weight_min = 1e-5;
 const float dimmer_least_hidden_span = 0.25;
@@ -64,7 +66,7 @@ vec4 dimmer_barycentric(uint tetrahedron, vec3 point) {
     vec4 volumes = vec4(dimmer_determinant(b, c, d), dimmer_determinant(a, d, c), dimmer_determinant(a, b, d),
                         dimmer_determinant(a, c, b));
     precise float sum = volumes.x + volumes.y + volumes.z + volumes.w;
-    float inverse = dimmer_reciprocal(sum);
+    float inverse = abs(sum) > dimmer_flat_volume ? dimmer_reciprocal(sum) : dimmer_flat_inverse;
     precise vec4 shares = volumes * inverse;
     return shares;
 }
