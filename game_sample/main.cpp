@@ -56,6 +56,8 @@ void declare(CLI::App& app, Arguments& arguments) {
     app.footer(
         "Without --headless a window opens: W A S D Q E fly, the right mouse button looks, Shift hurries; a panel has\n"
         "every light set and door, what each change costs, and limits; F1 hides it, F12 takes a picture, Esc quits.\n"
+        "It draws what a pack has: all doors slide aside, also those whose light was baked for another open pose, no\n"
+        "texture cuts holes into a mesh, and the sky is black but for what a script says.\n"
         "Examples: dimmer-sample house.dimmer\n"
         "          dimmer-sample house.dimmer --script demo.script --headless --out out/frames\n"
         "Exit codes: 0 done, 1 a fault of ours, 2 bad input or usage, 130 or 143 interrupted.");
