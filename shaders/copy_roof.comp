@@ -1,4 +1,4 @@
-// The roof for updates: loads and stores as many bytes as they do, and computes nothing. See gpu/copy_roof.h.
+// The roof for updates: loads and stores as many bytes as they do, and computes nothing. See tools/copy_roof.h.
 #version 450
 #extension GL_GOOGLE_include_directive : require
 

@@ -17,17 +17,16 @@ constexpr VkPipelineStageFlags compute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 
 Expected<ProbeAtlas> ProbeAtlas::create(const VulkanContext& vulkan, const PackData& data, uint32_t moving_probes,
                                         uint32_t set_count, Transfer& transfer) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
     const auto base_count = static_cast<uint32_t>(data.probes.base.size());
     const uint64_t bytes = (uint64_t{base_count} + moving_probes) * sizeof(ProbeRecord);
-    if (bytes > properties.limits.maxStorageBufferRange)
+    if (bytes > limits.maxStorageBufferRange)
         return fail(ErrorCode::Unsupported,
                     fmt::format("{} light probes and {} of moving models are more than this Vulkan device reads as one "
                                 "buffer of {} bytes. Cook with wider grids, or ask for fewer moving probes.",
-                                base_count, moving_probes, properties.limits.maxStorageBufferRange));
+                                base_count, moving_probes, limits.maxStorageBufferRange));
     ProbeAtlas atlas;
-    const std::vector<Run> all = {{0, 0, 7 * base_count}};
+    const std::vector<Run> all = {{0, 0, static_cast<uint32_t>(words_per_probe * base_count)}};
     for (uint32_t i = 0; i < set_count; ++i) {
         auto made = createBuffer(
             vulkan, bytes,
@@ -36,9 +35,10 @@ Expected<ProbeAtlas> ProbeAtlas::create(const VulkanContext& vulkan, const PackD
         if (!made) return std::unexpected(std::move(made.error()));
         // What belongs to no model yet is black.
         DIMMER_TRY(transfer.upload(made->buffer.get(), bytes, fillFrom(all, [&](uint32_t word) {
+                                       const size_t number = word / words_per_probe, part = word % words_per_probe;
                                        const ProbeRecord record =
-                                           canonicalProbe(data.color_format, data.probes.base[word / 7]);
-                                       return word % 7 == 0 ? record.light : record.bands[word % 7 - 1];
+                                           canonicalProbe(data.color_format, data.probes.base[number]);
+                                       return part == 0 ? record.light : record.bands[part - 1];
                                    })));
         atlas.sets_.push_back(std::move(*made));
     }

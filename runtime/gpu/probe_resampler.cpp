@@ -19,15 +19,14 @@ struct ResampledItems {
 }  // namespace
 
 Expected<GpuBuffer> uploadGridTable(const VulkanContext& vulkan, const GlobalGrid& grid, Transfer& transfer) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
     const uint64_t bytes = gridTableBytes(grid);
-    if (bytes > properties.limits.maxStorageBufferRange)
+    if (bytes > limits.maxStorageBufferRange)
         return fail(
             ErrorCode::Unsupported,
             fmt::format("The global light grid's {} tetrahedra take {} bytes, more than the {} that this Vulkan "
                         "device reads as one buffer. Cook with a wider grid.",
-                        grid.tetrahedra.size(), bytes, properties.limits.maxStorageBufferRange));
+                        grid.tetrahedra.size(), bytes, limits.maxStorageBufferRange));
     auto buffer = createBuffer(vulkan, bytes, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                MemoryUse::Device);
     if (!buffer) return buffer;
@@ -42,11 +41,10 @@ Expected<GpuBuffer> uploadGridTable(const VulkanContext& vulkan, const GlobalGri
 Expected<ProbeResampler> ProbeResampler::create(const VulkanContext& vulkan, const PackData& data,
                                                 const ModelSlots& models, const ProbeAtlas& atlas, uint32_t lists,
                                                 VkBuffer grid_table, Transfer& transfer) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
     ProbeResampler resampler;
     resampler.first_moving_ = static_cast<uint32_t>(data.probes.base.size());
-    resampler.groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
+    resampler.groups_x_max_ = limits.maxComputeWorkGroupCount[0];
     auto hints = createBuffer(vulkan, models.probesMax() * sizeof(uint32_t),
                               VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, MemoryUse::Device);
     if (!hints) return std::unexpected(std::move(hints.error()));

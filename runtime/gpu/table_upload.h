@@ -79,9 +79,7 @@ Expected<GpuTable> uploadTable(const VulkanContext& vulkan, Transfer& transfer, 
 
 // What the base pages hold at a receiver of the pack.
 inline TexelRecord baseAt(const PackData& data, uint32_t receiver) {
-    const uint32_t address = data.addresses[receiver];
-    const size_t row = size_t{TexelAddress::page(address)} * data.page_height + TexelAddress::y(address);
-    return canonical(data.color_format, data.base_pages[row * data.page_width + TexelAddress::x(address)]);
+    return canonical(data.color_format, data.base_pages[texelIndex(data, data.addresses[receiver])]);
 }
 
 // The grid of a dispatch in rows, as one side is limited (65535 on some devices); kernels skip the last row's rest.

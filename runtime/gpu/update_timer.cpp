@@ -1,5 +1,6 @@
 #include <gpu/update_timer.h>
 
+#include <gpu/memory.h>
 #include <gpu/queue_family.h>
 #include <gpu/vk_result.h>
 #include <gpu/vk_struct.h>
@@ -15,12 +16,11 @@ Expected<std::optional<UpdateTimer>> UpdateTimer::create(const VulkanContext& vu
     if (vulkan.compute_queue) bits = std::min(bits, families[vulkan.compute_queue_family].timestampValidBits);
     if (bits == 0) return std::nullopt;
 
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
     UpdateTimer timer;
     timer.device_ = vulkan.device;
     timer.valid_mask_ = bits >= 64 ? ~uint64_t{0} : (uint64_t{1} << bits) - 1;
-    timer.us_per_tick_ = static_cast<double>(properties.limits.timestampPeriod) * 1e-3;  // it is in nanoseconds
+    timer.us_per_tick_ = static_cast<double>(limits.timestampPeriod) * 1e-3;  // it is in nanoseconds
     auto info = vkStruct<VkQueryPoolCreateInfo>(VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO);
     info.queryType = VK_QUERY_TYPE_TIMESTAMP;
     info.queryCount = 2 * updates;

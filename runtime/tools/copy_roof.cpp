@@ -113,11 +113,9 @@ Expected<void> CopyRoof::createPages(const VulkanContext& vulkan, uint64_t writt
 }
 
 Expected<void> CopyRoof::createKernel(const VulkanContext& vulkan) {
-    VkPhysicalDeviceProperties properties;
-    vkGetPhysicalDeviceProperties(vulkan.physical_device, &properties);
-    groups_x_max_ = properties.limits.maxComputeWorkGroupCount[0];
-    group_lanes_max_ =
-        std::min(properties.limits.maxComputeWorkGroupInvocations, properties.limits.maxComputeWorkGroupSize[0]);
+    const VkPhysicalDeviceLimits limits = limitsOf(vulkan);
+    groups_x_max_ = limits.maxComputeWorkGroupCount[0];
+    group_lanes_max_ = std::min(limits.maxComputeWorkGroupInvocations, limits.maxComputeWorkGroupSize[0]);
     std::vector<Specialisation> pipelines;
     for (const Variant& variant : variants)
         for (const bool to_pages : {false, true})
