@@ -58,7 +58,8 @@ TEST(FreeSpace, AModelThatIsNotThereTouchesNothing) {
     EXPECT_TRUE(inTheOpen(rays, {0.1f, 0.1f, 0.44f}, 0));
 }
 
-// Rooms whose walls have no thickness, beside each other and in a hull that faces outwards.
+// Rooms whose walls have no thickness, beside each other and in a hull that faces outwards; on ground, and where behind
+// their outer walls is nothing.
 TEST(FreeSpace, RoomsOfPaperAreOpen) {
     Scene scene;
     const uint32_t grey = addMaterial(scene, lambert(0.5f));
@@ -70,11 +71,15 @@ TEST(FreeSpace, RoomsOfPaperAreOpen) {
         scene.meshes.push_back(beside);
     }
     addSolid(scene, "hull", {2, 0, 0}, {4, 2, 2}, grey);
+    const auto expectOpen = [&](std::initializer_list<float> places_x) {
+        const RayScene rays(scene);
+        for (const float x : places_x)
+            for (uint32_t i = 0; i < 20; ++i)
+                EXPECT_TRUE(inTheOpen(rays, glm::vec3(x, 0, 0) + 0.2f * sequence3d(i, 3) - 0.1f)) << x;
+    };
+    expectOpen({0, 4, 1.8f});
     addFloor(scene, 30, grey, -2.5f);
-    const RayScene rays(scene);
-    for (const float x : {0.0f, 4.0f, 1.8f, 10.0f})
-        for (uint32_t i = 0; i < 20; ++i)
-            EXPECT_TRUE(inTheOpen(rays, glm::vec3(x, 0, 0) + 0.2f * sequence3d(i, 3) - 0.1f)) << x;
+    expectOpen({0, 4, 1.8f, 10});
 }
 
 // Far outside most rays meet nothing, some the room's backs, and fewer the front of a screen that stands there. By 24
