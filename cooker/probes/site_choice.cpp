@@ -54,12 +54,18 @@ class Chooser {
             if (light.type != LightType::Directional && light.bake != BakeMode::None &&
                 std::ranges::find(lamps_, light.position_m) == lamps_.end())
                 lamps_.push_back(light.position_m);
-        const auto triangles = rays.triangles();
         leaves_.resize(rays.scene().doors.size());
-        for (uint32_t t = 0; t < triangles.size(); ++t)
-            if (const uint32_t condition = triangles[t].condition; condition != no_condition && condition % 2 == 0)
-                leaves_[condition / 2].push_back(t);
-        std::erase_if(leaves_, [](const auto& leaf) { return leaf.empty(); });
+        for (uint32_t t = 0; t < rays.triangles().size(); ++t) {
+            const uint32_t condition = rays.triangles()[t].condition;
+            if (condition == no_condition || condition % 2 != 0) continue;
+            const glm::vec3 a = rays.corner(t, 0);
+            const glm::vec3 cross = glm::cross(rays.corner(t, 1) - a, rays.corner(t, 2) - a);
+            Leaf& leaf = leaves_[condition / 2];
+            leaf.triangles.push_back(t);
+            leaf.cumulative_m2.push_back((leaf.cumulative_m2.empty() ? 0 : leaf.cumulative_m2.back()) +
+                                         0.5f * glm::length(cross));
+        }
+        std::erase_if(leaves_, [](const Leaf& leaf) { return leaf.triangles.empty(); });
     }
 
     Expected<SiteChoice> run() {
@@ -171,21 +177,14 @@ class Chooser {
     }
     // The doors in turns; off any of a leaf's triangles, by its area, to either side.
     glm::vec3 atDoor(uint32_t i) const {
-        const std::vector<uint32_t>& leaf = leaves_[i % leaves_.size()];
-        std::vector<float> areas;
-        for (const uint32_t t : leaf) {
-            const glm::vec3 a = rays_.corner(t, 0);
-            const glm::vec3 cross = glm::cross(rays_.corner(t, 1) - a, rays_.corner(t, 2) - a);
-            areas.push_back((areas.empty() ? 0 : areas.back()) + 0.5f * glm::length(cross));
-        }
+        const auto& [triangles, areas] = leaves_[i % leaves_.size()];
         const uint32_t seed = hash(i, door_place_seed);
-        const float at = areas.back() * unitFloat(hash(seed, 0));
-        const auto chosen =
-            std::min(static_cast<size_t>(std::ranges::upper_bound(areas, at) - areas.begin()), leaf.size() - 1);
+        const auto above = std::ranges::upper_bound(areas, areas.back() * unitFloat(hash(seed, 0)));
+        const uint32_t t = triangles[std::min(static_cast<size_t>(above - areas.begin()), triangles.size() - 1)];
         const glm::vec2 on = uniformOnTriangle(sequence2d(i, door_place_seed));
         const float side = hash(seed, 1) % 2 == 0 ? 1.0f : -1.0f;
         const float off_m = glm::mix(off_surface_min_m, off_leaf_max_m, unitFloat(hash(seed, 2)));
-        return rays_.pointOn(leaf[chosen], on.x, on.y) + side * off_m * rays_.triangles()[leaf[chosen]].normal;
+        return rays_.pointOn(t, on.x, on.y) + side * off_m * rays_.triangles()[t].normal;
     }
     std::vector<glm::vec3> around(glm::vec3 lamp_m, uint32_t count) const {
         return sites({static_cast<float>(count), near_m_, lamp_reach_m_, lamp_m.x, lamp_m.y, lamp_m.z}, count,
@@ -253,7 +252,11 @@ class Chooser {
     const GridSettings& settings_;
     GroupStore* store_;
     std::vector<glm::vec3> lamps_;
-    std::vector<std::vector<uint32_t>> leaves_;  // per door that has any: the triangles of its closed leaf
+    struct Leaf {
+        std::vector<uint32_t> triangles;
+        std::vector<float> cumulative_m2;
+    };
+    std::vector<Leaf> leaves_;  // closed ones, of the doors that have any
     float lamp_reach_m_ = 0, near_m_ = 0;
     SiteChoice out_;
 };
