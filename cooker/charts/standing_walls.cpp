@@ -2,8 +2,6 @@
 
 #include <charts/polygon.h>
 
-#include <glm/gtx/intersect.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -20,22 +18,16 @@ constexpr float facing_cos = 0.99f, facing_share = 0.9f, probe_share_of_room = 0
 constexpr float lean_max = 1.75f;      // what leans more is a roof
 constexpr float slope_cos_min = 0.5f;  // and what slopes more no ground
 // A trace need not be quite straight along the axis, over so much of its length and of a texel.
-constexpr float skew_share = 0.02f, skew_texels = 0.25f, skew_max_m = 0.1f;
-constexpr float same_slope = 1e-3f;
+constexpr float skew_share = 0.02f, skew_texels = 0.25f;
 // Directions of what stands on one chart are looked for so far: those of a tower of 256 sides.
 constexpr size_t turns_max = 64;
 constexpr float facet_min_texels = 0.25f;  // shorter ones have no direction of their own
-constexpr float skins_per_m = 1;           // places at which is looked what is behind a skin, within limits
-constexpr int skins_min = 3, skins_max = 16;
-constexpr float thick_m = 1;         // of solids: farther behind a face, a back is another wall's
-constexpr float room_min_m = 0.25f;  // between skins: less is no room
-// Feet of walls, and how far their pieces may lie apart, along them and, of their thickness, across.
-constexpr float foot_min_m = 0.25f, foot_length_min = 2, foot_gap_m = 0.02f, same_foot = 0.25f;
-constexpr float first_step_m = 1;  // of a ray; twice as far each time
-
-float largest(glm::vec3 p) {
-    return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
-}
+// Places at which is looked what is beside a trace, within limits.
+constexpr float skin_looks_per_m = 1, buried_looks_per_m = 4;
+constexpr int looks_min = 3, looks_max = 16;
+constexpr float overlap_max_m = 0.1f;  // of solids that are one
+constexpr float thick_m = 1;           // of solids: farther behind a face, a back is another wall's
+constexpr float room_min_m = 0.25f;    // between skins: less is no room
 
 // Pieces of one wall (its triangles, its faces) become one line.
 std::vector<WallLine> joined(std::vector<WallLine> lines) {
@@ -58,30 +50,26 @@ std::vector<WallLine> joined(std::vector<WallLine> lines) {
     return joined;
 }
 
+int placesAlong(glm::vec2 stretch, float per_m) {
+    return std::clamp(static_cast<int>(per_m * (stretch.y - stretch.x)), looks_min, looks_max);
+}
+
+// Off the middle, where edges are.
+float placeAlong(glm::vec2 stretch, int place, int places) {
+    return glm::mix(stretch.x, stretch.y, (static_cast<float>(place) + 0.57f) / static_cast<float>(places));
+}
+
 glm::vec2 flat(const ProjectedChart& chart, glm::vec3 p) {
     return {glm::dot(p, chart.u_axis), glm::dot(p, chart.v_axis)};
 }
 
 }  // namespace
 
-float slackAt(float at) {
-    return 4 * std::numeric_limits<float>::epsilon() * std::abs(at);
-}
-
 StandingWalls::StandingWalls(std::span<const PlanarFace> faces, Blocking blocking)
-    : faces_(faces), blocking_(std::move(blocking)), level_{glm::vec3(0), glm::vec3(0)} {
+    : faces_(faces), blocking_(faces, std::move(blocking)) {
     std::vector<BoxTree::Box> boxes;
-    for (const uint32_t f : blocking_.faces) {
-        const BoxTree::Box box = BoxTree::boxOf(faces_[f].corners_m);
-        if (boxes.empty()) level_ = box;
-        level_.min_m = glm::min(level_.min_m, box.min_m), level_.max_m = glm::max(level_.max_m, box.max_m);
-        boxes.push_back(box);
-    }
-    largest_m_ = std::max(largest(level_.min_m), largest(level_.max_m));
-    boxes_ = BoxTree(std::move(boxes));
-    boxes.clear();
     for (const PlanarFace& face : faces_) boxes.push_back(BoxTree::boxOf(face.corners_m));
-    all_boxes_ = BoxTree(std::move(boxes));
+    boxes_ = BoxTree(std::move(boxes));
 }
 
 WallLines StandingWalls::on(const ProjectedChart& chart, float coarsest_texels_per_metre) const {
@@ -134,15 +122,13 @@ ProjectedChart StandingWalls::turned(const ProjectedChart& chart, Turn turn) con
     return other;
 }
 
-auto StandingWalls::placeOf(const Trace& trace) {
-    return std::tuple(trace.axis, trace.forward, trace.at);
-}
-
 std::vector<WallLine> StandingWalls::alongAxes(const ProjectedChart& chart, float reach_m) const {
     std::vector<Trace> low = lowTraces(chart), high = joinedTraces(findTraces(chart, highProbe(chart), Which::All));
-    std::ranges::sort(low, {}, placeOf);
-    std::ranges::sort(high, {}, placeOf);
-    const std::vector<Trace> traces = standing(low, high);
+    sortByPlace(low);
+    sortByPlace(high);
+    // Before what is buried is left out: a skirting buries a wall's foot alone.
+    const std::vector<Trace> traces = withoutBuried(chart, standing(low, high));
+    low = withoutBuried(chart, std::move(low)), high = withoutBuried(chart, std::move(high));
     std::vector<WallLine> lines;
     for (const Trace& trace : traces)
         if (isSkin(chart, trace)) lines.push_back(trace);
@@ -151,72 +137,6 @@ std::vector<WallLine> StandingWalls::alongAxes(const ProjectedChart& chart, floa
     solids.insert(solids.end(), feet.begin(), feet.end());
     for (const Solid& s : solids) lines.push_back({s.axis, 0.5f * (s.low + s.high), s.from, s.to});
     return joined(std::move(lines));
-}
-
-// Stretch by stretch. Of traces in the order of placeOf.
-std::vector<StandingWalls::Solid> StandingWalls::solidsOf(std::span<const Trace> sorted, float reach_m) {
-    std::vector<Solid> solids;
-    for (const Trace& a : sorted) {
-        if (a.forward) continue;
-        std::vector<glm::vec2> open{{a.from, a.to}};
-        for (const Trace& b : near(sorted, a.axis, true, a.at - same_line_m, a.at + reach_m)) {
-            if (b.at < a.at - same_line_m || b.at - a.at > reach_m) continue;
-            std::vector<glm::vec2> left;
-            for (const glm::vec2 stretch : open) {
-                const float from = std::max(stretch.x, b.from), to = std::min(stretch.y, b.to);
-                if (!(to - from > same_line_m)) {
-                    left.push_back(stretch);
-                    continue;
-                }
-                solids.push_back({a.axis, a.at, b.at, from, to});
-                left.push_back({stretch.x, from});
-                left.push_back({to, stretch.y});
-            }
-            std::erase_if(left, [](glm::vec2 stretch) { return !(stretch.y - stretch.x > same_line_m); });
-            open = std::move(left);
-            if (open.empty()) break;
-        }
-    }
-    return solids;
-}
-
-// What of the low ones has a high one above it: the foot of a wall, which a skirting makes thicker, or a moulding.
-std::vector<StandingWalls::Solid> StandingWalls::solidsBelow(std::span<const Solid> high, std::span<const Solid> low,
-                                                             float reach_m) {
-    const auto placeOfSolid = [](const Solid& s) { return std::pair(s.axis, s.low); };
-    std::vector<Solid> sorted(high.begin(), high.end()), below;
-    std::ranges::sort(sorted, {}, placeOfSolid);
-    for (const Solid& a : low) {
-        const auto first = std::ranges::lower_bound(sorted, std::pair(a.axis, a.low - reach_m), {}, placeOfSolid);
-        for (auto b = first; b != sorted.end() && b->axis == a.axis && b->low <= a.high + same_line_m; ++b) {
-            const float from = std::max(a.from, b->from), to = std::min(a.to, b->to);
-            if (b->high >= a.low - same_line_m && to - from > same_line_m)
-                below.push_back({a.axis, a.low, a.high, from, to});
-        }
-    }
-    return longOnes(std::move(below));
-}
-
-// Pieces of one foot together, as a rough wall has many; legs of chairs and the like are left out.
-std::vector<StandingWalls::Solid> StandingWalls::longOnes(std::vector<Solid> solids) {
-    std::ranges::sort(solids, {}, [](const Solid& s) { return std::tuple(s.axis, s.from, s.to, s.low, s.high); });
-    std::vector<Solid> joined;
-    for (const Solid& s : solids) {
-        const auto goesOn = [&](const Solid& other) {
-            const float apart_m = 0.5f * std::abs(s.low + s.high - other.low - other.high);
-            return other.axis == s.axis && s.from <= other.to + foot_gap_m &&
-                   apart_m <= std::max(same_line_m, same_foot * std::min(s.high - s.low, other.high - other.low));
-        };
-        const auto other = std::ranges::find_if(joined, goesOn);
-        if (other == joined.end())
-            joined.push_back(s);
-        else
-            other->to = std::max(other->to, s.to);
-    }
-    std::erase_if(joined, [](const Solid& s) {
-        return s.to - s.from < std::max(foot_min_m, foot_length_min * (s.high - s.low));
-    });
-    return joined;
 }
 
 // A wall is as high as there is room: between the jambs of a narrow doorway a closed leaf stands from one to the
@@ -230,8 +150,8 @@ float StandingWalls::highProbe(const ProjectedChart& chart) const {
     const BoxTree::Box above = boxOver(chart, wall_probe_high_m);
     box.min_m = glm::min(box.min_m, above.min_m), box.max_m = glm::max(box.max_m, above.max_m);
     std::vector<std::pair<float, float>> facing;  // height, area over the chart's rectangle
-    for (const uint32_t near : boxes_.touching(box)) {
-        const PlanarFace& face = faces_[blocking_.faces[near]];
+    for (const uint32_t near : blocking_.touching(box)) {
+        const PlanarFace& face = blocking_.face(near);
         const float height = glm::dot(any.normal, face.corners_m[0]) - plane;
         const bool moves = face.group != 0;
         if (moves || glm::dot(any.normal, face.normal) > -facing_cos || height < doorway_min_m ||
@@ -250,33 +170,6 @@ float StandingWalls::highProbe(const ProjectedChart& chart) const {
     for (const auto& [height, area_m2] : facing)
         if ((covered += area_m2) >= facing_share * chart.size_m.x * chart.size_m.y) return probe_share_of_room * height;
     return wall_probe_high_m;
-}
-
-// Of traces in the order of placeOf, those between two places and perhaps a few more.
-std::span<const StandingWalls::Trace> StandingWalls::near(std::span<const Trace> sorted, int axis, bool forward,
-                                                          float low, float high) {
-    const auto first = std::ranges::lower_bound(sorted, std::tuple(axis, forward, low - slackAt(low)), {}, placeOf);
-    return {first, std::ranges::upper_bound(first, sorted.end(), std::tuple(axis, forward, high + slackAt(high)), {},
-                                            placeOf)};
-}
-
-// What is there at both heights, in one plane. Of traces in the order of placeOf.
-std::vector<StandingWalls::Trace> StandingWalls::standing(const std::vector<Trace>& low,
-                                                          const std::vector<Trace>& high) {
-    std::vector<Trace> both;
-    for (const Trace& a : low) {
-        const float leans_m = high.empty() ? 0 : a.lean * (high[0].height_m - a.height_m);
-        const float at = a.at + leans_m, reach_m = same_line_m + skew_max_m;
-        for (const Trace& b : near(high, a.axis, a.forward, at - reach_m, at + reach_m)) {
-            Trace trace = a;
-            trace.from = std::max(a.from, b.from), trace.to = std::min(a.to, b.to);
-            if (!(trace.to - trace.from > same_line_m)) continue;
-            const float middle = 0.5f * (trace.from + trace.to);
-            if (std::abs(a.atAlong(middle) + leans_m - b.atAlong(middle)) <= same_line_m) both.push_back(trace);
-        }
-    }
-    std::ranges::sort(both, {}, placeOf);
-    return both;
 }
 
 // A place at a height over a chart. The normal of one of its faces may differ from the chart's own by a rounding step.
@@ -301,7 +194,8 @@ BoxTree::Box StandingWalls::boxOver(const ProjectedChart& chart, float height_m)
     }
     BoxTree::Box box = BoxTree::boxOf(corners);
     const float reach_m =
-        wall_margin_m + same_line_m + rounding_share * std::max({largest_m_, largest(box.min_m), largest(box.max_m)});
+        wall_margin_m + same_line_m +
+        rounding_share * std::max({blocking_.largestCoordinate(), largestOf(box.min_m), largestOf(box.max_m)});
     box.min_m -= reach_m;
     box.max_m += reach_m;
     return box;
@@ -317,8 +211,8 @@ std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const ProjectedCha
     const PlanarFace& any = faces_[chart.faces[0]];
     const float height = glm::dot(any.normal, any.corners_m[0]) + height_m;
     std::vector<Segment> segments;
-    for (const uint32_t near : boxes_.touching(boxOver(chart, height_m))) {
-        const PlanarFace& face = faces_[blocking_.faces[near]];
+    for (const uint32_t near : blocking_.touching(boxOver(chart, height_m))) {
+        const PlanarFace& face = blocking_.face(near);
         if (which != Which::All && (face.group != 0) != (which == Which::Leaves)) continue;
         std::array<float, 3> d;
         for (size_t i = 0; i < 3; ++i) d[i] = glm::dot(any.normal, face.corners_m[i]) - height;
@@ -331,17 +225,16 @@ std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const ProjectedCha
         }
         if (n < 2) continue;
         segments.push_back({ends[0], ends[1], flat(chart, face.normal), glm::dot(any.normal, face.normal),
-                            blocking_.double_sided[near]});
+                            blocking_.isDoubleSided(near), face.group != 0});
     }
     return segments;
 }
 
-std::vector<StandingWalls::Trace> StandingWalls::findTraces(const ProjectedChart& chart, float height_m,
-                                                            Which which) const {
+std::vector<Trace> StandingWalls::findTraces(const ProjectedChart& chart, float height_m, Which which) const {
     const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
     std::vector<Trace> traces;
     for (const Segment& segment : segmentsAt(chart, height_m, which)) {
-        const auto& [a, b, normal, rise, double_sided] = segment;
+        const auto& [a, b, normal, rise, double_sided, moves] = segment;
         for (int axis = 0; axis < 2; ++axis) {
             const int along = 1 - axis;
             if (std::abs(a[axis] - b[axis]) > segment.slackM(chart.texels_per_metre)) continue;
@@ -352,7 +245,7 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const ProjectedChart
             if (to - from < same_line_m || foot < low[axis] - wall_margin_m || foot > high[axis] + wall_margin_m)
                 continue;
             const bool forward = normal[axis] > 0;
-            Trace trace{{axis, at, from, to}, forward, double_sided, lean};
+            Trace trace{{axis, at, from, to}, forward, double_sided, moves, lean};
             const bool long_enough = std::abs(a[along] - b[along]) > same_line_m;
             trace.skew = long_enough ? (b[axis] - a[axis]) / (b[along] - a[along]) : 0;
             trace.middle = 0.5f * (a[along] + b[along]);
@@ -366,7 +259,7 @@ std::vector<StandingWalls::Trace> StandingWalls::findTraces(const ProjectedChart
 }
 
 // Of leaves over what does not move a little higher up.
-std::vector<StandingWalls::Trace> StandingWalls::lowTraces(const ProjectedChart& chart) const {
+std::vector<Trace> StandingWalls::lowTraces(const ProjectedChart& chart) const {
     if (faces_[chart.faces[0]].group != 0) return joinedTraces(findTraces(chart, wall_probe_low_m, Which::All));
     std::vector<Trace> traces = findTraces(chart, wall_probe_low_m, Which::Fixed);
     const std::vector<Trace> leaves = findTraces(chart, leaf_probe_low_m, Which::Leaves);
@@ -374,24 +267,54 @@ std::vector<StandingWalls::Trace> StandingWalls::lowTraces(const ProjectedChart&
     return joinedTraces(std::move(traces));
 }
 
-// A tessellated wall is one: of its pieces on one line.
-std::vector<StandingWalls::Trace> StandingWalls::joinedTraces(std::vector<Trace> traces) {
-    const auto kind = [](const Trace& t) { return std::tuple(t.axis, t.forward, t.double_sided, t.height_m); };
-    std::ranges::sort(traces, {}, [&](const Trace& t) { return std::tuple(kind(t), t.at, t.from, t.to, t.lean); });
-    std::vector<Trace> joined;
-    for (const Trace& t : traces) {
-        if (!joined.empty()) {
-            Trace& last = joined.back();
-            const bool straight = std::abs(last.skew) < same_slope && std::abs(t.skew) < same_slope;
-            if (kind(last) == kind(t) && last.at == t.at && t.from <= last.to + same_line_m && straight &&
-                std::abs(last.lean - t.lean) < same_slope) {
-                last.to = std::max(last.to, t.to);
-                continue;
-            }
+// Without what lies within solids that touch or overlap others: steps made of boxes are one solid, and each of them a
+// wall no more. Of traces in their order.
+std::vector<Trace> StandingWalls::withoutBuried(const ProjectedChart& chart, std::vector<Trace> sorted) const {
+    std::vector<Trace> open;
+    for (const Trace& trace : sorted) {
+        std::vector<glm::vec2> left{{trace.from, trace.to}};
+        for (const glm::vec2 stretch : stretchesBeside(trace, sorted))
+            if (isBuried(chart, trace, stretch)) left = without(left, stretch);
+        for (const glm::vec2 stretch : left) {
+            open.push_back(trace);
+            open.back().from = stretch.x, open.back().to = stretch.y;
         }
-        joined.push_back(t);
     }
-    return joined;
+    return open;
+}
+
+// Between the ends of what may begin in front of the end of its own solid, or touch it. (A leaf is of no solid.)
+std::vector<glm::vec2> StandingWalls::stretchesBeside(const Trace& trace, std::span<const Trace> sorted) {
+    if (trace.moves) return {};
+    const auto [low, high] = trace.forward ? std::pair(trace.at - overlap_max_m, trace.at + same_line_m)
+                                           : std::pair(trace.at - same_line_m, trace.at + overlap_max_m);
+    std::vector<float> ends;
+    for (const Trace& other : tracesNear(sorted, trace.axis, !trace.forward, low, high)) {
+        const float from = std::max(trace.from, other.from), to = std::min(trace.to, other.to);
+        if (other.at >= low && other.at <= high && !other.moves && to > from) ends.insert(ends.end(), {from, to});
+    }
+    std::ranges::sort(ends);
+    std::vector<glm::vec2> stretches;
+    for (size_t i = 1; i < ends.size(); ++i)
+        if (ends[i] - ends[i - 1] > same_line_m) stretches.emplace_back(ends[i - 1], ends[i]);
+    return stretches;
+}
+
+// All along a stretch of it what is in front is within solids.
+bool StandingWalls::isBuried(const ProjectedChart& chart, const Trace& trace, glm::vec2 stretch) const {
+    const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis),
+                    before = (trace.forward ? 1.0f : -1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
+    const int places = placesAlong(stretch, buried_looks_per_m);
+    for (int i = 0; i < places; ++i) {
+        const float along = placeAlong(stretch, i, places), at = trace.atAlong(along);
+        const glm::vec3 from =
+            onPlane(chart, trace.axis == 0 ? glm::vec2(at, along) : glm::vec2(along, at), trace.height_m) +
+            wall_margin_m * before;
+        // Backs in front alone may be those of a room that is seen from outside of it; nothing is over oneself there.
+        // Levels are low: most places are done with after the short way up.
+        if (!blocking_.startsInSolid(from, up) || !blocking_.startsInSolid(from, before)) return false;
+    }
+    return true;
 }
 
 // A face of no solid: the chart goes on behind it, with room, and backs are seen there neither close behind, nor along
@@ -401,18 +324,19 @@ bool StandingWalls::isSkin(const ProjectedChart& chart, const Trace& trace) cons
     if (trace.double_sided) return false;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
                     behind = (trace.forward ? -1.0f : 1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
-    const int places = std::clamp(static_cast<int>(skins_per_m * (trace.to - trace.from)), skins_min, skins_max);
+    const glm::vec2 stretch(trace.from, trace.to);
+    const int places = placesAlong(stretch, skin_looks_per_m);
     for (int i = 0; i < places; ++i) {
-        // Off the middle, where edges are.
-        const float at = glm::mix(trace.from, trace.to, (static_cast<float>(i) + 0.57f) / static_cast<float>(places));
+        const float at = placeAlong(stretch, i, places);
         const glm::vec3 on_line =
             onPlane(chart, trace.axis == 0 ? glm::vec2(trace.at, at) : glm::vec2(at, trace.at), 0);
         const glm::vec3 beside = 2 * wall_margin_m * behind;
         if (!covers(chart, on_line - beside) || !covers(chart, on_line + beside)) continue;
         const glm::vec3 from = on_line + beside + wall_probe_low_m * up;
-        const Met next = meets(from, behind);
+        const BlockingRays::Met next = blocking_.meets(from, behind);
         const bool open = next.at_m > (next.is_back ? thick_m : room_min_m);
-        if (open && !meets(from, along).is_back && !meets(from, -along).is_back && !meets(from, up).is_back)
+        if (open && !blocking_.meets(from, along).is_back && !blocking_.meets(from, -along).is_back &&
+            !blocking_.meets(from, up).is_back)
             return true;
     }
     return false;
@@ -420,7 +344,7 @@ bool StandingWalls::isSkin(const ProjectedChart& chart, const Trace& trace) cons
 
 bool StandingWalls::covers(const ProjectedChart& chart, glm::vec3 p) const {
     const glm::vec2 at = flat(chart, p);
-    return std::ranges::any_of(all_boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t face) {
+    return std::ranges::any_of(boxes_.touching({p - same_line_m, p + same_line_m}), [&](uint32_t face) {
         if (!std::ranges::binary_search(chart.faces, face)) return false;
         std::array<float, 3> side;
         for (size_t i = 0; i < 3; ++i) {
@@ -430,34 +354,6 @@ bool StandingWalls::covers(const ProjectedChart& chart, glm::vec3 p) const {
         }
         return std::ranges::min(side) >= 0;
     });
-}
-
-// The first thing on a ray. Where a face and a back touch it is the face that counts, as for rays of light.
-StandingWalls::Met StandingWalls::meets(glm::vec3 from, glm::vec3 direction) const {
-    float end_m = 0;  // of the level
-    for (uint32_t i = 0; i < 8; ++i) {
-        const glm::vec3 corner = glm::mix(level_.min_m, level_.max_m, glm::vec3(i & 1, i >> 1 & 1, i >> 2));
-        end_m = std::max(end_m, glm::dot(corner - from, direction));
-    }
-    constexpr float none = std::numeric_limits<float>::max();
-    float face_m = none, back_m = none;
-    for (float step_m = first_step_m, done_m = 0; std::min(face_m, back_m) == none && done_m < end_m; step_m *= 2) {
-        done_m = step_m;
-        BoxTree::Box box = BoxTree::boxOf(std::array{from, from + std::min(step_m, end_m) * direction});
-        box.min_m -= same_line_m, box.max_m += same_line_m;
-        for (const uint32_t near : boxes_.touching(box)) {
-            const PlanarFace& face = faces_[blocking_.faces[near]];
-            glm::vec2 weights;
-            float away_m = 0;
-            const auto& [a, b, c] = face.corners_m;
-            if (!glm::intersectRayTriangle(from, direction, a, b, c, weights, away_m)) continue;
-            if (away_m < 0 || away_m > step_m) continue;
-            const bool is_back = glm::dot(face.normal, direction) > 0 && !blocking_.double_sided[near];
-            float& nearest_m = is_back ? back_m : face_m;
-            nearest_m = std::min(nearest_m, away_m);
-        }
-    }
-    return back_m < face_m - same_line_m ? Met{back_m, true} : Met{face_m, false};
 }
 
 }  // namespace dimmer::cook

@@ -1,8 +1,10 @@
 // Finds the thin walls that stand on charts.
 #pragma once
 
+#include <charts/blocking_rays.h>
 #include <charts/box_tree.h>
 #include <charts/planar.h>
+#include <charts/wall_traces.h>
 
 #include <cstdint>
 #include <span>
@@ -18,31 +20,12 @@ struct Turn {
     glm::vec2 axis(int i) const { return i == 0 ? glm::vec2(cos, sin) : glm::vec2(-sin, cos); }
 };
 
-// Where a wall stands on a chart: a stretch of the line x = at (axis 0) or y = at (axis 1), in metres along axes that
-// may be turned.
-struct WallLine {
-    int axis = 0;
-    float at = 0, from = 0, to = 0;
-    uint32_t turn = 0;  // whose axes
-};
-
 struct WallLines {
     std::vector<Turn> turns;      // the first one is none
     std::vector<WallLine> lines;  // in the order of turn, axis and place
 };
 
-inline constexpr float same_line_m = 2e-3f;     // what lies closer is one line
-inline constexpr float wall_margin_m = 5e-3f;   // a wall this close to a rectangle's edge parts nothing
-inline constexpr float rounding_share = 1e-5f;  // of the largest coordinate: far above what a few dot products lose
-
-// What sums with a coordinate lose to rounding, and more.
-float slackAt(float at);
-
-// What light does not pass, indices of faces, and whether they block with both sides.
-struct Blocking {
-    std::vector<uint32_t> faces;  // ascending
-    std::vector<bool> double_sided;
-};
+inline constexpr float wall_margin_m = 5e-3f;  // a wall this close to a rectangle's edge parts nothing
 
 // Immutable after construction; queries are thread-safe.
 class StandingWalls {
@@ -60,40 +43,17 @@ class StandingWalls {
     WallLines on(const ProjectedChart& chart, float coarsest_texels_per_metre) const;
 
    private:
-    // The trace of blocking triangles in one plane at a height over a chart.
-    struct Trace : WallLine {
-        bool forward = false;       // its front looks towards larger coordinates
-        bool double_sided = false;  // of triangles that leave a trace of either direction
-        float lean = 0;             // metres that it moves along its axis with each metre of height
-        float skew = 0;             // and along the other axis, from its own middle on
-        float middle = 0;
-        float height_m = 0;
-
-        float atAlong(float place) const { return at + skew * (place - middle); }
-    };
     // Of one triangle, along the chart's axes.
     struct Segment {
         glm::vec2 a, b, normal;  // the triangle's own, as it looks from above
         float rise;              // of that normal
-        bool double_sided;
+        bool double_sided, moves;
 
         // Metres to the line that both ends may lie beside, of a chart of so many texels per metre.
         float slackM(float texels_per_metre) const;
     };
-    // Between a face that looks back and the next that looks forward, at a height over a chart.
-    struct Solid {
-        int axis = 0;
-        float low = 0, high = 0, from = 0, to = 0;  // across the axis' line, and along it
-    };
     enum class Which { Fixed, Leaves, All };
 
-    static auto placeOf(const Trace& trace);
-    static std::span<const Trace> near(std::span<const Trace> sorted, int axis, bool forward, float low, float high);
-    static std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Trace>& high);
-    static std::vector<Solid> solidsOf(std::span<const Trace> sorted, float reach_m);
-    static std::vector<Solid> solidsBelow(std::span<const Solid> high, std::span<const Solid> low, float reach_m);
-    static std::vector<Solid> longOnes(std::vector<Solid> solids);
-    static std::vector<Trace> joinedTraces(std::vector<Trace> traces);
     std::vector<WallLine> alongAxes(const ProjectedChart& chart, float reach_m) const;
     std::vector<Turn> turnsOf(const ProjectedChart& chart) const;
     ProjectedChart turned(const ProjectedChart& chart, Turn turn) const;
@@ -103,20 +63,14 @@ class StandingWalls {
     float highProbe(const ProjectedChart& chart) const;
     glm::vec3 onPlane(const ProjectedChart& chart, glm::vec2 at, float height_m) const;
     BoxTree::Box boxOver(const ProjectedChart& chart, float height_m) const;
+    std::vector<Trace> withoutBuried(const ProjectedChart& chart, std::vector<Trace> sorted) const;
+    static std::vector<glm::vec2> stretchesBeside(const Trace& trace, std::span<const Trace> sorted);
+    bool isBuried(const ProjectedChart& chart, const Trace& trace, glm::vec2 stretch) const;
     bool isSkin(const ProjectedChart& chart, const Trace& trace) const;
     bool covers(const ProjectedChart& chart, glm::vec3 p) const;
-    struct Met {
-        float at_m;  // the largest number: nothing
-        bool is_back;
-    };
-    Met meets(glm::vec3 from, glm::vec3 direction) const;
-
     std::span<const PlanarFace> faces_;
-    Blocking blocking_;
-    BoxTree boxes_;        // of blocking_.faces
-    BoxTree all_boxes_;    // of all faces
-    BoxTree::Box level_;   // that holds what blocks
-    float largest_m_ = 0;  // coordinate among theirs
+    BlockingRays blocking_;
+    BoxTree boxes_;  // of all faces
 };
 
 }  // namespace dimmer::cook
