@@ -1,4 +1,4 @@
-// Symmetric positive definite systems of which each row's entries begin somewhere before its diagonal (the envelope of
+// Symmetric positive definite systems of blocks of which each couples with a few of the next ones (the envelope of
 // Jennings 1966): a lattice's neighbours are near, so that most of a dense matrix is never touched.
 #pragma once
 
@@ -7,72 +7,104 @@
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace dimmer::cook {
 
 class EnvelopeMatrix {
    public:
-    // `first`: per row, the column of its first entry, at most the row's own number. All entries 0.
-    explicit EnvelopeMatrix(std::vector<size_t> first) : first_(std::move(first)), begin_(first_.size() + 1) {
-        for (size_t i = 0; i < size(); ++i) begin_[i + 1] = begin_[i] + i + 1 - first_[i];
+    static constexpr size_t block = 9;  // rows and columns: the coefficients of a probe
+
+    // `last`: per block, the last one that it couples with, at least itself. All entries 0.
+    explicit EnvelopeMatrix(std::vector<size_t> last) : last_(std::move(last)) {
+        // What is eliminated couples all that it coupled with.
+        for (size_t b = 1; b < last_.size(); ++b) last_[b] = std::max(last_[b], last_[b - 1]);
+        begin_.push_back(0);
+        for (size_t b = 0; b < last_.size(); ++b) begin_.push_back(begin_.back() + block * widthOf(b));
         entries_.resize(begin_.back());
     }
 
-    size_t size() const { return first_.size(); }
-    // Below the diagonal or on it, in the envelope.
-    double& at(size_t row, size_t column) { return entries_[begin_[row] + column - first_[row]]; }
+    size_t size() const { return last_.size() * block; }
+    // On the diagonal or right of it, in the envelope. Entries in a block follow one another along its rows.
+    double& at(size_t row, size_t column) { return rowAt(row)[column]; }
 
-    // The matrix becomes the factor L of its Cholesky decomposition L L^T, with the inverses of its diagonal.
+    // The matrix becomes the factor U of its Cholesky decomposition U^T U, with the inverses of its diagonal.
     void factor() {
-        for (size_t i = 0; i < size(); ++i) {
-            double* const row = rowAt(i);
-            for (size_t j = first_[i]; j < i; ++j) row[j] = (row[j] - product(i, j)) * rowAt(j)[j];
-            row[i] = 1 / std::sqrt(row[i] - product(i, i));
+        for (size_t b = 0; b < last_.size(); ++b) {
+            const size_t first = b * block, end = endOf(b);
+            for (size_t i = first; i < first + block; ++i) {
+                double* const row = rowAt(i);
+                for (size_t k = first; k < i; ++k) subtract(row, rowAt(k), rowAt(k)[i], i, end);
+                row[i] = 1 / std::sqrt(row[i]);
+                for (size_t j = i + 1; j < end; ++j) row[j] *= row[i];
+            }
+            for (size_t i = first + block; i < end; ++i) subtractBlock(rowAt(i), rowAt(first), widthOf(b), i, end);
         }
     }
 
     // Of a factor: x becomes the solution for the right-hand side x.
     void solve(std::span<double> x) const {
-        for (size_t i = 0; i < size(); ++i)
-            x[i] = (x[i] - dot(rowAt(i) + first_[i], &x[first_[i]], i - first_[i])) * rowAt(i)[i];
+        for (size_t i = 0; i < size(); ++i) {
+            const double* const row = rowAt(i);
+            x[i] *= row[i];
+            subtract(x.data(), row, x[i], i + 1, endOf(i / block));
+        }
         for (size_t i = size(); i-- > 0;) {
-            x[i] *= rowAt(i)[i];
-            for (size_t j = first_[i]; j < i; ++j) x[j] -= rowAt(i)[j] * x[i];
+            const double* const row = rowAt(i);
+            x[i] = (x[i] - dot(row, x.data(), i + 1, endOf(i / block))) * row[i];
         }
     }
 
     // Of a matrix that is no factor: `out` becomes the product.
     void multiply(std::span<const double> x, std::span<double> out) const {
+        std::ranges::fill(out, 0.0);
         for (size_t i = 0; i < size(); ++i) {
             const double* const row = rowAt(i);
-            out[i] = dot(row + first_[i], &x[first_[i]], i + 1 - first_[i]);
-            for (size_t j = first_[i]; j < i; ++j) out[j] += row[j] * x[i];
+            out[i] += dot(row, x.data(), i, endOf(i / block));
+            subtract(out.data(), row, -x[i], i + 1, endOf(i / block));
         }
     }
 
    private:
-    // Indexed by column.
-    double* rowAt(size_t i) { return entries_.data() + begin_[i] - first_[i]; }
-    const double* rowAt(size_t i) const { return entries_.data() + begin_[i] - first_[i]; }
-    // Of the parts of two rows left of column j, j <= i.
-    double product(size_t i, size_t j) const {
-        const size_t from = std::max(first_[i], first_[j]);
-        return from < j ? dot(rowAt(i) + from, rowAt(j) + from, j - from) : 0;
+    size_t endOf(size_t b) const { return (last_[b] + 1) * block; }
+    size_t widthOf(size_t b) const { return endOf(b) - b * block; }
+    // Indexed by column, from its block's first on.
+    double* rowAt(size_t i) { return entries_.data() + offsetOf(i); }
+    const double* rowAt(size_t i) const { return entries_.data() + offsetOf(i); }
+    size_t offsetOf(size_t i) const {
+        const size_t b = i / block;
+        return begin_[b] + (i - b * block) * widthOf(b) - b * block;
+    }
+
+    static void subtract(double* __restrict out, const double* __restrict row, double factor, size_t from, size_t to) {
+        for (size_t j = from; j < to; ++j) out[j] -= factor * row[j];
+    }
+    // What the rows of a block, `stride` apart, leave in row i.
+    static void subtractBlock(double* __restrict out, const double* __restrict rows, size_t stride, size_t i,
+                              size_t to) {
+        std::array<double, block> factors;
+        for (size_t r = 0; r < block; ++r) factors[r] = rows[r * stride + i];
+        for (size_t j = i; j < to; ++j) {
+            double sum = 0;
+            for (size_t r = 0; r < block; ++r) sum += factors[r] * rows[r * stride + j];
+            out[j] -= sum;
+        }
     }
     // In lanes of their own, which compilers may not make of one sum.
-    static double dot(const double* a, const double* b, size_t n) {
+    static double dot(const double* a, const double* b, size_t from, size_t to) {
         std::array<double, 8> lanes{};
-        size_t i = 0;
-        for (; i + lanes.size() <= n; i += lanes.size())
+        size_t i = from;
+        for (; i + lanes.size() <= to; i += lanes.size())
             for (size_t l = 0; l < lanes.size(); ++l) lanes[l] += a[i + l] * b[i + l];
         double sum = 0;
-        for (; i < n; ++i) sum += a[i] * b[i];
+        for (; i < to; ++i) sum += a[i] * b[i];
         for (const double l : lanes) sum += l;
         return sum;
     }
 
-    std::vector<size_t> first_, begin_;
+    std::vector<size_t> last_;   // ascending
+    std::vector<size_t> begin_;  // of each block's rows
     std::vector<double> entries_;
 };
 

@@ -22,6 +22,7 @@ struct ModelLight {
     std::span<const ModelPlace> places;
     std::span<const std::vector<ReceiverLight>> at_places;
     std::span<const std::vector<ProbeTermLight>> at_probes;  // those inside of something have their source's
+    glm::uvec3 lattice;                                      // of the probes
 };
 
 template <class Light>
@@ -54,7 +55,7 @@ std::vector<ProbeLight> fitted(const ModelLight& model, uint32_t term) {
         const Gathered* light = lightOf<Gathered>(row, term);
         lux.push_back(light ? light->irradiance_lux : glm::vec3(0));
     }
-    fitModel(model.places, lux, probes);
+    fitModel(model.places, lux, probes, model.lattice);
     return probes;
 }
 
@@ -130,8 +131,9 @@ class LocalBake {
             const size_t probe = first_probe_[m], probes = first_probe_[m + 1] - probe;
             if (places > 0) {
                 auto rows = fitTerms(
-                    series_, {std::span(places_).subspan(place, places), std::span(at_places).subspan(place, places),
-                              std::span(at_probes).subspan(probe, probes)});
+                    series_,
+                    {std::span(places_).subspan(place, places), std::span(at_places).subspan(place, places),
+                     std::span(at_probes).subspan(probe, probes), gatherer_.rays().scene().models[model_[m]].probes});
                 std::ranges::move(rows, at_probes.begin() + static_cast<std::ptrdiff_t>(probe));
             }
             progress_.advance(probes);

@@ -11,6 +11,8 @@
 namespace dimmer::cook::test {
 namespace {
 
+constexpr glm::uvec3 cube(2);
+
 // Of a model of 2 x 2 x 2 probes, the corners of a unit cube, on all normals.
 std::vector<ModelPlace> placesInCube(uint32_t count) {
     std::vector<ModelPlace> places;
@@ -61,7 +63,7 @@ TEST(ModelFit, FindsTheProbesThatMadeTheLight) {
         return error / static_cast<double>(places.size());
     };
     const double before = meanError();
-    fitModel(places, lux, probes);
+    fitModel(places, lux, probes, cube);
     // What was gathered still has a tenth of a say, spread over what the places know little of.
     EXPECT_GT(before, 0.05);
     EXPECT_LT(meanError(), before / 10);
@@ -79,7 +81,7 @@ TEST(ModelFit, NoNormalGetsNegativeLightAndDeringingTakesNothing) {
     gathered.add(glm::vec3(100), ProbeLight::weightsOf({0, 1, 0}));
     ASSERT_LT(positiveShare(gathered), 0.9f);
     std::vector<ProbeLight> probes(8, gathered), flat(8, flattened(gathered, 0.95f * positiveShare(gathered)));
-    fitModel(places, lux, probes);
+    fitModel(places, lux, probes, cube);
     double fitted = 0, deringed = 0;
     for (ProbeLight& p : probes) {
         // Normals lie some 18 degrees apart: between two of them a lobe falls by less than the 5 % that it keeps.
@@ -109,7 +111,7 @@ TEST(ModelFit, WhatNoPlaceAsksForStaysAsGathered) {
     ProbeLight even;
     even.radiance[0] = glm::vec3(1);
     std::vector<ProbeLight> probes(8, even);
-    fitModel(places, lux, probes);
+    fitModel(places, lux, probes, cube);
     for (size_t i = 4; i < 8; ++i)
         for (size_t c = 0; c < sh_count; ++c) EXPECT_NEAR(probes[i].radiance[c].x, even.radiance[c].x, 1e-5f);
     // The others are lit by 7 lux, but for the tenth that 0.89 lux as gathered has in what a probe is asked for.
@@ -133,7 +135,7 @@ TEST(ModelFit, DarkPlacesCountForMore) {
     const float dc_per_lux = 1 / (ProbeLight{{glm::vec3(1)}}.irradiance().x);
     probes[0].radiance[0] = glm::vec3(dark * dc_per_lux);
     probes[1].radiance[0] = glm::vec3(bright * dc_per_lux);
-    fitModel(places, lux, probes);
+    fitModel(places, lux, probes, cube);
     const double floor = 0.1 * (double{dark} + bright) / 2;
     const double expected = (dark + floor) / (bright + floor);
     const double a = static_cast<double>(probes[0].irradiance().x - dark);
@@ -148,7 +150,7 @@ TEST(ModelFit, WhereAllIsDarkProbesStay) {
     const auto places = placesInCube(100);
     const std::vector<glm::vec3> dark(places.size(), glm::vec3(0));
     std::vector<ProbeLight> probes(8, lamp(1, 2));
-    fitModel(places, dark, probes);
+    fitModel(places, dark, probes, cube);
     for (const ProbeLight& p : probes) EXPECT_EQ(p.radiance, lamp(1, 2).radiance);
 }
 
@@ -158,7 +160,7 @@ TEST(ModelFit, DarkProbesAndChannelsGiveFiniteLight) {
     std::vector<glm::vec3> lux(places.size(), glm::vec3(0));
     for (size_t i = 0; i < lux.size(); i += 2) lux[i] = glm::vec3(5, 0, 1e-30f);
     std::vector<ProbeLight> probes(8);
-    fitModel(places, lux, probes);
+    fitModel(places, lux, probes, cube);
     float most = 0;
     for (const ProbeLight& p : probes)
         for (const glm::vec3& c : p.radiance) {
@@ -169,16 +171,57 @@ TEST(ModelFit, DarkProbesAndChannelsGiveFiniteLight) {
     EXPECT_GT(most, 0.1f);
 }
 
-// Dominated by its diagonal, with a known x, in an envelope that begins at other columns in each row.
+// Places in a lattice whose longest axis is x, and the same with x and z exchanged.
+TEST(ModelFit, AxesMayBeLongInAnyOrder) {
+    constexpr glm::uvec3 lattice(5, 2, 3);
+    constexpr uint32_t count = lattice.x * lattice.y * lattice.z;
+    const auto fittedProbes = [&](bool exchanged) {
+        const glm::uvec3 size = exchanged ? glm::uvec3(lattice.z, lattice.y, lattice.x) : lattice;
+        const auto numberOf = [&](glm::uvec3 at) {
+            if (exchanged) std::swap(at.x, at.z);
+            return at.x + size.x * (at.y + size.y * at.z);
+        };
+        auto places = placesInCube(16 * count);
+        std::vector<glm::vec3> lux;
+        for (uint32_t i = 0; i < places.size(); ++i) {
+            const glm::vec3 at = sequence3d(i, 3) * glm::vec3(lattice - 1u),
+                            n = uniformSphereDirection(sequence2d(i, 2));
+            const glm::uvec3 cell(at);
+            const glm::vec3 in = at - glm::vec3(cell);
+            for (uint32_t k = 0; k < 8; ++k) {
+                const glm::uvec3 corner(k & 1, k >> 1 & 1, k >> 2);
+                const glm::vec3 share = glm::mix(1.0f - in, in, glm::vec3(corner));
+                places[i].near.number[k] = numberOf(cell + corner);
+                places[i].near.share[k] = share.x * share.y * share.z;
+            }
+            lux.emplace_back((100 + 20 * at.x) * std::max(n.y, 0.0f) + at.z + 1);
+        }
+        std::vector<ProbeLight> probes(count, lamp(1, 20)), in_order;
+        fitModel(places, lux, probes, size);
+        for (uint32_t p = 0; p < count; ++p)
+            in_order.push_back(
+                probes[numberOf({p % lattice.x, p / lattice.x % lattice.y, p / (lattice.x * lattice.y)})]);
+        return in_order;
+    };
+    const auto one = fittedProbes(false), other = fittedProbes(true);
+    const float scale = one[0].radiance[0].x;
+    EXPECT_GT(scale, 10);
+    EXPECT_GT(one[count - 1].radiance[0].x, 1.3f * scale);  // it does grow along x
+    for (uint32_t p = 0; p < count; ++p)
+        for (size_t c = 0; c < sh_count; ++c)
+            EXPECT_NEAR(one[p].radiance[c].x, other[p].radiance[c].x, 1e-5f * scale) << p << ", " << c;
+}
+
+// Dominated by its diagonal, with a known x; each block goes another way past its own.
 TEST(EnvelopeMatrix, SolvesWhatItWasMultipliedWith) {
-    constexpr size_t n = 40;
-    std::vector<size_t> first;
-    for (size_t i = 0; i < n; ++i) first.push_back(i - std::min<size_t>(i, 3 + i % 9));
-    EnvelopeMatrix matrix(first);
+    constexpr size_t blocks = 7, n = blocks * EnvelopeMatrix::block;
+    const std::vector<size_t> last{2, 1, 4, 3, 4, 6, 6};
+    EnvelopeMatrix matrix(last);
+    ASSERT_EQ(matrix.size(), n);
     std::vector<std::vector<double>> dense(n, std::vector<double>(n));
     for (size_t i = 0; i < n; ++i)
-        for (size_t j = first[i]; j <= i; ++j) {
-            const double entry = i == j ? 20 : std::sin(static_cast<double>(7 * i + 3 * j));
+        for (size_t j = i; j < (last[i / EnvelopeMatrix::block] + 1) * EnvelopeMatrix::block; ++j) {
+            const double entry = i == j ? 40 : std::sin(static_cast<double>(7 * i + 3 * j));
             matrix.at(i, j) = dense[i][j] = dense[j][i] = entry;
         }
     std::vector<double> x(n), product(n), expected(n);
