@@ -22,12 +22,10 @@ constexpr float skew_share = 0.02f, skew_texels = 0.25f;
 // Directions of what stands on one chart are looked for so far: those of a tower of 256 sides.
 constexpr size_t turns_max = 64;
 constexpr float facet_min_texels = 0.25f;  // shorter ones have no direction of their own
-// Places at which is looked what is beside a trace, within limits.
-constexpr float skin_looks_per_m = 1, buried_looks_per_m = 4;
-constexpr int looks_min = 3, looks_max = 16;
-constexpr float overlap_max_m = 0.1f;  // of solids that are one
-constexpr float thick_m = 1;           // of solids: farther behind a face, a back is another wall's
-constexpr float room_min_m = 0.25f;    // between skins: less is no room
+constexpr float skins_per_m = 1;           // places at which is looked what is behind a skin, within limits
+constexpr int skins_min = 3, skins_max = 16;
+constexpr float thick_m = 1;         // of solids: farther behind a face, a back is another wall's
+constexpr float room_min_m = 0.25f;  // between skins: less is no room
 
 // Pieces of one wall (its triangles, its faces) become one line.
 std::vector<WallLine> joined(std::vector<WallLine> lines) {
@@ -48,15 +46,6 @@ std::vector<WallLine> joined(std::vector<WallLine> lines) {
         same->to = std::max(same->to, l.to);
     }
     return joined;
-}
-
-int placesAlong(glm::vec2 stretch, float per_m) {
-    return std::clamp(static_cast<int>(per_m * (stretch.y - stretch.x)), looks_min, looks_max);
-}
-
-// Off the middle, where edges are.
-float placeAlong(glm::vec2 stretch, int place, int places) {
-    return glm::mix(stretch.x, stretch.y, (static_cast<float>(place) + 0.57f) / static_cast<float>(places));
 }
 
 glm::vec2 flat(const ProjectedChart& chart, glm::vec3 p) {
@@ -126,9 +115,7 @@ std::vector<WallLine> StandingWalls::alongAxes(const ProjectedChart& chart, floa
     std::vector<Trace> low = lowTraces(chart), high = joinedTraces(findTraces(chart, highProbe(chart), Which::All));
     sortByPlace(low);
     sortByPlace(high);
-    // Before what is buried is left out: a skirting buries a wall's foot alone.
-    const std::vector<Trace> traces = withoutBuried(chart, standing(low, high));
-    low = withoutBuried(chart, std::move(low)), high = withoutBuried(chart, std::move(high));
+    const std::vector<Trace> traces = standing(low, high);
     std::vector<WallLine> lines;
     for (const Trace& trace : traces)
         if (isSkin(chart, trace)) lines.push_back(trace);
@@ -225,7 +212,7 @@ std::vector<StandingWalls::Segment> StandingWalls::segmentsAt(const ProjectedCha
         }
         if (n < 2) continue;
         segments.push_back({ends[0], ends[1], flat(chart, face.normal), glm::dot(any.normal, face.normal),
-                            blocking_.isDoubleSided(near), face.group != 0});
+                            blocking_.isDoubleSided(near)});
     }
     return segments;
 }
@@ -234,7 +221,7 @@ std::vector<Trace> StandingWalls::findTraces(const ProjectedChart& chart, float 
     const glm::vec2 low = chart.min_m, high = chart.min_m + chart.size_m;
     std::vector<Trace> traces;
     for (const Segment& segment : segmentsAt(chart, height_m, which)) {
-        const auto& [a, b, normal, rise, double_sided, moves] = segment;
+        const auto& [a, b, normal, rise, double_sided] = segment;
         for (int axis = 0; axis < 2; ++axis) {
             const int along = 1 - axis;
             if (std::abs(a[axis] - b[axis]) > segment.slackM(chart.texels_per_metre)) continue;
@@ -245,7 +232,7 @@ std::vector<Trace> StandingWalls::findTraces(const ProjectedChart& chart, float 
             if (to - from < same_line_m || foot < low[axis] - wall_margin_m || foot > high[axis] + wall_margin_m)
                 continue;
             const bool forward = normal[axis] > 0;
-            Trace trace{{axis, at, from, to}, forward, double_sided, moves, lean};
+            Trace trace{{axis, at, from, to}, forward, double_sided, lean};
             const bool long_enough = std::abs(a[along] - b[along]) > same_line_m;
             trace.skew = long_enough ? (b[axis] - a[axis]) / (b[along] - a[along]) : 0;
             trace.middle = 0.5f * (a[along] + b[along]);
@@ -267,56 +254,6 @@ std::vector<Trace> StandingWalls::lowTraces(const ProjectedChart& chart) const {
     return joinedTraces(std::move(traces));
 }
 
-// Without what lies within solids that touch or overlap others: steps made of boxes are one solid, and each of them a
-// wall no more. Of traces in their order.
-std::vector<Trace> StandingWalls::withoutBuried(const ProjectedChart& chart, std::vector<Trace> sorted) const {
-    std::vector<Trace> open;
-    for (const Trace& trace : sorted) {
-        std::vector<glm::vec2> left{{trace.from, trace.to}};
-        for (const glm::vec2 stretch : stretchesBeside(trace, sorted))
-            if (isBuried(chart, trace, stretch)) left = without(left, stretch);
-        for (const glm::vec2 stretch : left) {
-            open.push_back(trace);
-            open.back().from = stretch.x, open.back().to = stretch.y;
-        }
-    }
-    return open;
-}
-
-// Between the ends of what may begin in front of the end of its own solid, or touch it. (A leaf is of no solid.)
-std::vector<glm::vec2> StandingWalls::stretchesBeside(const Trace& trace, std::span<const Trace> sorted) {
-    if (trace.moves) return {};
-    const auto [low, high] = trace.forward ? std::pair(trace.at - overlap_max_m, trace.at + same_line_m)
-                                           : std::pair(trace.at - same_line_m, trace.at + overlap_max_m);
-    std::vector<float> ends;
-    for (const Trace& other : tracesNear(sorted, trace.axis, !trace.forward, low, high)) {
-        const float from = std::max(trace.from, other.from), to = std::min(trace.to, other.to);
-        if (other.at >= low && other.at <= high && !other.moves && to > from) ends.insert(ends.end(), {from, to});
-    }
-    std::ranges::sort(ends);
-    std::vector<glm::vec2> stretches;
-    for (size_t i = 1; i < ends.size(); ++i)
-        if (ends[i] - ends[i - 1] > same_line_m) stretches.emplace_back(ends[i - 1], ends[i]);
-    return stretches;
-}
-
-// All along a stretch of it what is in front is within solids.
-bool StandingWalls::isBuried(const ProjectedChart& chart, const Trace& trace, glm::vec2 stretch) const {
-    const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis),
-                    before = (trace.forward ? 1.0f : -1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
-    const int places = placesAlong(stretch, buried_looks_per_m);
-    for (int i = 0; i < places; ++i) {
-        const float along = placeAlong(stretch, i, places), at = trace.atAlong(along);
-        const glm::vec3 from =
-            onPlane(chart, trace.axis == 0 ? glm::vec2(at, along) : glm::vec2(along, at), trace.height_m) +
-            wall_margin_m * before;
-        // Backs in front alone may be those of a room that is seen from outside of it; nothing is over oneself there.
-        // Levels are low: most places are done with after the short way up.
-        if (!blocking_.startsInSolid(from, up) || !blocking_.startsInSolid(from, before)) return false;
-    }
-    return true;
-}
-
 // A face of no solid: the chart goes on behind it, with room, and backs are seen there neither close behind, nor along
 // the face or straight up. (They are within solids, and within what lacks the sides that touch others: cupboards,
 // steps.)
@@ -324,10 +261,10 @@ bool StandingWalls::isSkin(const ProjectedChart& chart, const Trace& trace) cons
     if (trace.double_sided) return false;
     const glm::vec3 up = glm::cross(chart.u_axis, chart.v_axis), along = trace.axis == 0 ? chart.v_axis : chart.u_axis,
                     behind = (trace.forward ? -1.0f : 1.0f) * (trace.axis == 0 ? chart.u_axis : chart.v_axis);
-    const glm::vec2 stretch(trace.from, trace.to);
-    const int places = placesAlong(stretch, skin_looks_per_m);
+    const int places = std::clamp(static_cast<int>(skins_per_m * (trace.to - trace.from)), skins_min, skins_max);
     for (int i = 0; i < places; ++i) {
-        const float at = placeAlong(stretch, i, places);
+        // Off the middle, where edges are.
+        const float at = glm::mix(trace.from, trace.to, (static_cast<float>(i) + 0.57f) / static_cast<float>(places));
         const glm::vec3 on_line =
             onPlane(chart, trace.axis == 0 ? glm::vec2(trace.at, at) : glm::vec2(at, trace.at), 0);
         const glm::vec3 beside = 2 * wall_margin_m * behind;

@@ -47,7 +47,7 @@ class StandingWalls {
     struct Segment {
         glm::vec2 a, b, normal;  // the triangle's own, as it looks from above
         float rise;              // of that normal
-        bool double_sided, moves;
+        bool double_sided;
 
         // Metres to the line that both ends may lie beside, of a chart of so many texels per metre.
         float slackM(float texels_per_metre) const;
@@ -63,9 +63,6 @@ class StandingWalls {
     float highProbe(const ProjectedChart& chart) const;
     glm::vec3 onPlane(const ProjectedChart& chart, glm::vec2 at, float height_m) const;
     BoxTree::Box boxOver(const ProjectedChart& chart, float height_m) const;
-    std::vector<Trace> withoutBuried(const ProjectedChart& chart, std::vector<Trace> sorted) const;
-    static std::vector<glm::vec2> stretchesBeside(const Trace& trace, std::span<const Trace> sorted);
-    bool isBuried(const ProjectedChart& chart, const Trace& trace, glm::vec2 stretch) const;
     bool isSkin(const ProjectedChart& chart, const Trace& trace) const;
     bool covers(const ProjectedChart& chart, glm::vec3 p) const;
     std::span<const PlanarFace> faces_;

@@ -57,7 +57,7 @@ std::span<const Trace> tracesNear(std::span<const Trace> sorted, int axis, bool 
 }
 
 std::vector<Trace> joinedTraces(std::vector<Trace> traces) {
-    const auto kind = [](const Trace& t) { return std::tuple(t.axis, t.forward, t.double_sided, t.moves, t.height_m); };
+    const auto kind = [](const Trace& t) { return std::tuple(t.axis, t.forward, t.double_sided, t.height_m); };
     std::ranges::sort(traces, {}, [&](const Trace& t) { return std::tuple(kind(t), t.at, t.from, t.to, t.lean); });
     std::vector<Trace> joined;
     for (const Trace& t : traces) {

@@ -27,7 +27,6 @@ float slackAt(float at);
 struct Trace : WallLine {
     bool forward = false;       // its front looks towards larger coordinates
     bool double_sided = false;  // of triangles that leave a trace of either direction
-    bool moves = false;         // of a door's leaf
     float lean = 0;             // metres that it moves along its axis with each metre of height
     float skew = 0;             // and along the other axis, from its own middle on
     float middle = 0;
