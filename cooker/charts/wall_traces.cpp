@@ -9,8 +9,7 @@
 namespace dimmer::cook {
 namespace {
 
-// A trace need not be quite straight along the axis: at most so far off.
-constexpr float same_slope = 1e-3f;
+constexpr float same_slope = 1e-3f;  // of pieces that become one trace: less askew and leaning apart is rounding
 // Feet of walls, and how far their pieces may lie apart, along them and, of their thickness, across.
 constexpr float foot_min_m = 0.25f, foot_length_min = 2, foot_gap_m = 0.02f, same_foot = 0.25f;
 
