@@ -32,6 +32,7 @@ class BlockingRays {
     };
     // The first thing on a ray. Where a face and a back touch it is the face that counts, as for rays of light.
     Met meets(glm::vec3 from, glm::vec3 direction) const;
+
     // By place among those of the blocking.
     const PlanarFace& face(uint32_t i) const { return faces_[blocking_.faces[i]]; }
     bool isDoubleSided(uint32_t i) const { return blocking_.double_sided[i]; }

@@ -65,6 +65,7 @@ class StandingWalls {
     BoxTree::Box boxOver(const ProjectedChart& chart, float height_m) const;
     bool isSkin(const ProjectedChart& chart, const Trace& trace) const;
     bool covers(const ProjectedChart& chart, glm::vec3 p) const;
+
     std::span<const PlanarFace> faces_;
     BlockingRays blocking_;
     BoxTree boxes_;  // of all faces

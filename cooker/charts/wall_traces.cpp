@@ -39,6 +39,22 @@ std::vector<Solid> longOnes(std::vector<Solid> solids) {
     return joined;
 }
 
+// What is left of stretches without one more, but for what is too short to count.
+std::vector<glm::vec2> without(std::span<const glm::vec2> stretches, glm::vec2 gone) {
+    std::vector<glm::vec2> left;
+    for (const glm::vec2 stretch : stretches) {
+        const float from = std::max(stretch.x, gone.x), to = std::min(stretch.y, gone.y);
+        if (!(to - from > same_line_m)) {
+            left.push_back(stretch);
+            continue;
+        }
+        left.push_back({stretch.x, from});
+        left.push_back({to, stretch.y});
+    }
+    std::erase_if(left, [](glm::vec2 stretch) { return !(stretch.y - stretch.x > same_line_m); });
+    return left;
+}
+
 }  // namespace
 
 float slackAt(float at) {
@@ -89,21 +105,6 @@ std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Tra
     }
     sortByPlace(both);
     return both;
-}
-
-std::vector<glm::vec2> without(std::span<const glm::vec2> stretches, glm::vec2 gone) {
-    std::vector<glm::vec2> left;
-    for (const glm::vec2 stretch : stretches) {
-        const float from = std::max(stretch.x, gone.x), to = std::min(stretch.y, gone.y);
-        if (!(to - from > same_line_m)) {
-            left.push_back(stretch);
-            continue;
-        }
-        left.push_back({stretch.x, from});
-        left.push_back({to, stretch.y});
-    }
-    std::erase_if(left, [](glm::vec2 stretch) { return !(stretch.y - stretch.x > same_line_m); });
-    return left;
 }
 
 std::vector<Solid> solidsOf(std::span<const Trace> sorted, float reach_m) {

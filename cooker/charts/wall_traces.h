@@ -49,8 +49,6 @@ std::span<const Trace> tracesNear(std::span<const Trace> sorted, int axis, bool 
 std::vector<Trace> joinedTraces(std::vector<Trace> traces);
 // What is there at both heights, in one plane; sorted.
 std::vector<Trace> standing(const std::vector<Trace>& low, const std::vector<Trace>& high);
-// What is left of stretches without one more, but for what is too short to count.
-std::vector<glm::vec2> without(std::span<const glm::vec2> stretches, glm::vec2 gone);
 // At most so thick; stretch by stretch.
 std::vector<Solid> solidsOf(std::span<const Trace> sorted, float reach_m);
 // What of the low ones has a high one above it: the foot of a wall, which a skirting makes thicker, or a moulding.

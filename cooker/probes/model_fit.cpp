@@ -21,7 +21,7 @@ constexpr double gathered_weight = 0.1, negative_weight = 100;
 constexpr uint32_t asked_normals = 128;
 constexpr double least_share = 0.05;
 constexpr int newton_steps = 40, halvings_max = 20;
-constexpr double gain_min = 1e-4;  // of what there is to minimise
+constexpr double gain_min = 1e-6;  // of what there is to minimise
 
 static_assert(EnvelopeMatrix::block == sh_count);
 
@@ -175,7 +175,7 @@ class ModelFit {
     }
 
     // 1/2 x.A x - target.x + the lack's cost. Between changes of which normals are negative it is a quadratic, of which
-    // each of Newton's steps finds the least.
+    // each of Newton's steps finds the least: the sum's own, where the same normals are negative there.
     void minimise(std::span<const double> target, Coefficients& x, Lack& lack) const {
         Coefficients image(size()), step(size()), image_of_step(size()), trial(size());
         Lack of_trial = lack;
@@ -201,12 +201,20 @@ class ModelFit {
                 gain = lack.cost - of_trial.cost - change;
             }
             if (!(gain > 0)) return;
+            const bool found = length == 1 && haveSameNormals(lack, of_trial);
             for (size_t i = 0; i < size(); ++i) image[i] += length * image_of_step[i];
             std::swap(x, trial);
             std::swap(lack, of_trial);
             plain += change;
-            if (gain <= gain_min * std::abs(plain + lack.cost)) return;
+            if (found || gain <= gain_min * std::abs(plain + lack.cost)) return;
         }
+    }
+
+    static bool haveSameNormals(const Lack& a, const Lack& b) {
+        for (size_t p = 0; p < a.irradiance.size(); ++p)
+            for (size_t n = 0; n < asked_normals; ++n)
+                if ((a.irradiance[p][n] < 0) != (b.irradiance[p][n] < 0)) return false;
+        return true;
     }
 
     // Where the quadratic has its least that is so negative on just these normals.

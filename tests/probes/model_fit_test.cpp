@@ -171,6 +171,45 @@ TEST(ModelFit, DarkProbesAndChannelsGiveFiniteLight) {
     EXPECT_GT(most, 0.1f);
 }
 
+// Light from above, from below and from all around, with lobes that are cut off at other normals: each channel is
+// fitted as it would be by itself, whatever the one before it was like.
+TEST(ModelFit, ChannelsDoNotMix) {
+    const auto places = placesInCube(400);
+    std::array<std::vector<float>, 3> lights;
+    for (size_t i = 0; i < places.size(); ++i) {
+        const glm::vec3 n = uniformSphereDirection(sequence2d(static_cast<uint32_t>(i), 2));
+        lights[0].push_back(100 * std::max(n.y, 0.0f) + 1);
+        lights[1].push_back(100 * std::max(-n.y, 0.0f) + 1);
+        lights[2].push_back(40 + 10 * n.x);
+    }
+    ProbeLight gathered;
+    gathered.radiance[0] = glm::vec3(30);
+    const auto fittedAs = [&](std::array<size_t, 3> order) {
+        std::vector<glm::vec3> lux(places.size());
+        for (size_t i = 0; i < places.size(); ++i)
+            lux[i] = {lights[order[0]][i], lights[order[1]][i], lights[order[2]][i]};
+        std::vector<ProbeLight> probes(8, gathered);
+        fitModel(places, lux, probes, cube);
+        return probes;
+    };
+    // All channels alike: each begins with its own light's negative normals.
+    std::array<std::vector<ProbeLight>, 3> alone;
+    for (size_t l = 0; l < 3; ++l) alone[l] = fittedAs({l, l, l});
+    for (const auto& order : {std::array<size_t, 3>{0, 1, 2}, {1, 0, 2}, {2, 0, 1}, {2, 1, 0}}) {
+        const auto together = fittedAs(order);
+        for (int channel = 0; channel < 3; ++channel)
+            for (size_t p = 0; p < 8; ++p)
+                for (size_t c = 0; c < sh_count; ++c) {
+                    // Newton's last step gained less than 1e-6 of the sum of 8 probes: of one's, where it has the
+                    // least weight, a tenth, sqrt(1e-6 * 8 / 0.1) = 0.9 %.
+                    const size_t l = order[static_cast<size_t>(channel)];
+                    EXPECT_NEAR(together[p].radiance[c][channel], alone[l][p].radiance[c].x,
+                                0.01f * alone[l][p].radiance[0].x)
+                        << l << " as channel " << channel << ": " << p << ", " << c;
+                }
+    }
+}
+
 // Places in a lattice whose longest axis is x, and the same with x and z exchanged.
 TEST(ModelFit, AxesMayBeLongInAnyOrder) {
     constexpr glm::uvec3 lattice(5, 2, 3);
@@ -207,6 +246,7 @@ TEST(ModelFit, AxesMayBeLongInAnyOrder) {
     const float scale = one[0].radiance[0].x;
     EXPECT_GT(scale, 10);
     EXPECT_GT(one[count - 1].radiance[0].x, 1.3f * scale);  // it does grow along x
+    // Sums in another order round otherwise, in floats of probes.
     for (uint32_t p = 0; p < count; ++p)
         for (size_t c = 0; c < sh_count; ++c)
             EXPECT_NEAR(one[p].radiance[c].x, other[p].radiance[c].x, 1e-5f * scale) << p << ", " << c;
